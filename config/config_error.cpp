@@ -8,16 +8,16 @@
 namespace wrenchd {
 namespace {
 
-std::string to_lines(const std::vector<Refusal>& refusals) {
+std::string to_lines(const std::vector<Rejection>& rejections) {
   std::string lines;
-  for (const Refusal& refusal : refusals) {
+  for (const Rejection& rejection : rejections) {
     if (!lines.empty()) lines += '\n';
-    lines += to_text(refusal);
+    lines += to_text(rejection);
   }
   return lines;
 }
 
-bool earlier(const Refusal& a, const Refusal& b) {
+bool earlier(const Rejection& a, const Rejection& b) {
   const bool a_inherited = a.location.file != nullptr, b_inherited = b.location.file != nullptr;
   return std::tie(a_inherited, a.location.line, a.location.column) <
          std::tie(b_inherited, b.location.line, b.location.column);
@@ -25,12 +25,12 @@ bool earlier(const Refusal& a, const Refusal& b) {
 
 }  // namespace
 
-std::string to_text(const Refusal& refusal) {
-  std::string where = refusal.file.string();
-  if (refusal.location.line > 0) {
-    where += ':' + std::to_string(refusal.location.line) + ':' + std::to_string(refusal.location.column);
+std::string to_text(const Rejection& rejection) {
+  std::string where = rejection.file.string();
+  if (rejection.location.line > 0) {
+    where += ':' + std::to_string(rejection.location.line) + ':' + std::to_string(rejection.location.column);
   }
-  return where + ": " + refusal.message;
+  return where + ": " + rejection.message;
 }
 
 std::string printable(std::string text, std::size_t longest) {
@@ -40,21 +40,21 @@ std::string printable(std::string text, std::size_t longest) {
   return text;
 }
 
-ConfigError::ConfigError(std::vector<Refusal> refusals)
-    : std::runtime_error(to_lines(refusals)), refusals_(std::move(refusals)) {}
+ConfigError::ConfigError(std::vector<Rejection> rejections)
+    : std::runtime_error(to_lines(rejections)), rejections_(std::move(rejections)) {}
 
 ConfigError::ConfigError(std::filesystem::path file, SourceLocation place, std::string message)
-    : ConfigError(std::vector<Refusal>{{std::move(file), place, std::move(message)}}) {}
+    : ConfigError(std::vector<Rejection>{{std::move(file), place, std::move(message)}}) {}
 
-void RefusalList::add(SourceLocation place, std::string message) {
+void RejectionList::add(SourceLocation place, std::string message) {
   const std::filesystem::path& file = place.file ? *place.file : file_;
-  refusals_.push_back({file, std::move(place), std::move(message)});
+  rejections_.push_back({file, std::move(place), std::move(message)});
 }
 
-void RefusalList::throw_if_any() {
-  if (refusals_.empty()) return;
-  std::stable_sort(refusals_.begin(), refusals_.end(), earlier);
-  throw ConfigError(std::move(refusals_));
+void RejectionList::throw_if_any() {
+  if (rejections_.empty()) return;
+  std::stable_sort(rejections_.begin(), rejections_.end(), earlier);
+  throw ConfigError(std::move(rejections_));
 }
 
 }  // namespace wrenchd

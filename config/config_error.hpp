@@ -18,14 +18,14 @@ struct SourceLocation {
 };
 
 /// One defect of a file: location, expected value, found value and remedy.
-struct Refusal {
+struct Rejection {
   std::filesystem::path file;
   SourceLocation location;
   std::string message;
 };
 
 /// "FILE:LINE:COLUMN: message", which editors and terminals can open.
-std::string to_text(const Refusal& refusal);
+std::string to_text(const Rejection& rejection);
 
 /// The text as a message may quote it: truncated to `longest` bytes, control characters replaced.
 std::string printable(std::string text, std::size_t longest = 60);
@@ -33,26 +33,26 @@ std::string printable(std::string text, std::size_t longest = 60);
 /// A file was rejected. what() has one line per defect, in file order.
 class ConfigError : public std::runtime_error {
  public:
-  explicit ConfigError(std::vector<Refusal> refusals);
+  explicit ConfigError(std::vector<Rejection> rejections);
   ConfigError(std::filesystem::path file, SourceLocation place, std::string message);
 
-  const std::vector<Refusal>& refusals() const noexcept { return refusals_; }
+  const std::vector<Rejection>& rejections() const noexcept { return rejections_; }
 
  private:
-  std::vector<Refusal> refusals_;
+  std::vector<Rejection> rejections_;
 };
 
 /// Collects all defects of one file, so that the user sees them at once.
-class RefusalList {
+class RejectionList {
  public:
-  explicit RefusalList(std::filesystem::path file) : file_(std::move(file)) {}
+  explicit RejectionList(std::filesystem::path file) : file_(std::move(file)) {}
 
   void add(SourceLocation place, std::string message);
   void throw_if_any();
 
  private:
   std::filesystem::path file_;
-  std::vector<Refusal> refusals_;
+  std::vector<Rejection> rejections_;
 };
 
 }  // namespace wrenchd

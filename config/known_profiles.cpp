@@ -11,8 +11,8 @@ KnownProfiles known_profiles(const SearchPath& search) {
     try {
       known.profiles.push_back(load_profile(file, search));
       known.files.push_back(file);
-    } catch (const std::exception& refused) {
-      known.refused.emplace_back(refused.what());
+    } catch (const std::exception& rejected) {
+      known.rejected.emplace_back(rejected.what());
     }
   }
   return known;

@@ -26,9 +26,9 @@ void read_waypoint(TomlTable& table, HandScript& script) {
   table.mandatory("position_m").vector(w.position_m, {-10, 10});
   table.optional("rotation_vector_rad").vector(w.rotation_vector_rad, {-100, 100});
 
-  if (time_good && script.path.empty() && w.time_s != 0.0) time.refuse("the first waypoint is at time 0");
+  if (time_good && script.path.empty() && w.time_s != 0.0) time.reject("the first waypoint is at time 0");
   if (time_good && !script.path.empty() && w.time_s < script.path.back().time_s + kMinStep_s) {
-    time.refuse("times must ascend by 0.001 s or more; the waypoint before is at " +
+    time.reject("times must ascend by 0.001 s or more; the waypoint before is at " +
                 to_text(script.path.back().time_s) + " s");
   }
   script.path.push_back(w);
@@ -45,10 +45,10 @@ void read_script(TomlTable& table, HandScript& script) {
   const auto points = waypoints.elements("tables, each headed [[waypoint]]");
   for (const TomlValue& point : points) point.table(read_waypoint, script);
 
-  if (waypoints.is_array() && points.empty()) waypoints.refuse("at least one waypoint is needed");
+  if (waypoints.is_array() && points.empty()) waypoints.reject("at least one waypoint is needed");
   if (script.path.empty() || !script.repeats) return;
   if (!same_point(script.path.front(), script.path.back())) {
-    points.back().refuse(
+    points.back().reject(
         "a path that repeats ends where it starts; add such a waypoint, or set repeats = false");
   }
 }

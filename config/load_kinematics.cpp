@@ -20,7 +20,7 @@ void read_report_index(const TomlValue& value, Kinematics& k) {
   for (std::size_t i = 0; i < k.joints; ++i) {
     const auto index = static_cast<std::size_t>(indices[i]);
     if (static_cast<double>(index) != indices[i] || taken[index])
-      return value.refuse("must name each integer of joints once, from 0 to " + std::to_string(k.joints - 1));
+      return value.reject("must name each integer of joints once, from 0 to " + std::to_string(k.joints - 1));
     taken[index] = true;
     k.report_index[i] = index;
   }
@@ -38,7 +38,7 @@ void read_count_button(TomlTable& table, Kinematics& k) {
 bool read_directions(const TomlValue& value, std::span<double> out) {
   if (!value.numbers(out, {-1, 1})) return false;
   if (std::all_of(out.begin(), out.end(), [](double d) { return d == 1.0 || d == -1.0; })) return true;
-  value.refuse("each must be 1 or -1");
+  value.reject("each must be 1 or -1");
   return false;
 }
 
@@ -83,7 +83,7 @@ void read_delta(TomlTable& table, Kinematics& k) {
   table.mandatory("zero_rad").number(zero_rad, {-7, 7});
   const TomlValue effort_value = table.mandatory("effort_per_Nm", "effort_per_Nm");
   if (effort_value.number(effort, {-1e6, 1e6}) && effort == 0.0)
-    effort_value.refuse("must not be 0: it is the motor effort for 1 N.m about a leg's joint");
+    effort_value.reject("must not be 0: it is the motor effort for 1 N.m about a leg's joint");
   table.mandatory("max_effort").number(k.max_effort, {1e-3, 1e6});
   for (std::size_t i = 0; i < k.joints; ++i) {
     k.rad_per_count[i] = gear * kTurn_rad / per_turn;

@@ -47,7 +47,7 @@ void read_fault(TomlTable& table, LoopbackScript& script) {
                                               {"short_report", Kind::short_report},
                                               {"long_report", Kind::long_report},
                                               {"wrong_id", Kind::wrong_id},
-                                              {"refuse_commands", Kind::refuse_commands},
+                                              {"reject_commands", Kind::reject_commands},
                                               {"drop_commands", Kind::drop_commands},
                                               {"stall", Kind::stall},
                                               {"bad_quaternion", Kind::bad_quaternion},
@@ -62,7 +62,7 @@ void read_fault(TomlTable& table, LoopbackScript& script) {
   const TomlValue value = table.optional("value");
   const Range range = value_range(fault.kind);
   if (value && !(range.max > range.min))
-    value.refuse("a fault of this kind has no value; leave it out");
+    value.reject("a fault of this kind has no value; leave it out");
   else
     value.number(fault.value, range);
   fault.start = from_seconds(at_s);

@@ -35,7 +35,7 @@ void read_workspace(TomlTable& table, DeviceProfile& p) {
   if (is_stated(radius)) radius.number(p.workspace_radius_m, {0.01, 2});
   centre.vector(p.workspace_centre_m, {-2, 2});
   if (centre && !centre.is_inherited() && !is_stated(radius))
-    centre.refuse("has no effect without workspace_radius_m; state both");
+    centre.reject("has no effect without workspace_radius_m; state both");
 }
 
 /// Rejects a rating above the maximum. An inherited rating above a lowered maximum is clamped to it: the
@@ -45,7 +45,7 @@ void read_rating(const TomlValue& value, double& rating, Range range, double max
   if (value.is_inherited())
     rating = maximum;
   else
-    value.refuse("is more than the maximum, " + value.with_unit(maximum) +
+    value.reject("is more than the maximum, " + value.with_unit(maximum) +
                  "; lower it, or leave all three out");
 }
 
@@ -55,14 +55,14 @@ void read_motor_ratings(TomlTable& table, DeviceProfile& p, const Capabilities& 
   const TomlValue torque = table.optional("continuous_torque_Nm");
   const TomlValue time = table.optional("thermal_time_s");
   if (is_stated(torque) && !capabilities.torque)
-    return torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
+    return torque.reject("the device takes no torque; leave it out, or give wrench_report its field");
   std::vector<const TomlValue*> stated, all = {&force, &time};
   if (capabilities.torque) all.push_back(&torque);
   std::copy_if(all.begin(), all.end(), std::back_inserter(stated),
                [](const auto* v) { return is_stated(*v); });
   if (stated.empty()) return;
   if (stated.size() < all.size())
-    return stated.front()->refuse(capabilities.torque
+    return stated.front()->reject(capabilities.torque
                                       ? "needs continuous_force_N, continuous_torque_Nm and "
                                         "thermal_time_s; state all three, or none"
                                       : "needs continuous_force_N and thermal_time_s; state both, or none");
@@ -80,13 +80,13 @@ void read_more_limits(TomlTable& table, DeviceProfile& p, const Capabilities& ca
     read_workspace(table, p);
     return read_motor_ratings(table, p, capabilities);
   }
-  const auto refuse = [](const TomlValue& value) {
-    if (value) value.refuse("the device has no motors: there is no wrench_report; leave it out");
+  const auto reject = [](const TomlValue& value) {
+    if (value) value.reject("the device has no motors: there is no wrench_report; leave it out");
   };
-  refuse(power);
+  reject(power);
   for (const char* key : {"workspace_radius_m", "workspace_centre_m", "continuous_force_N",
                           "continuous_torque_Nm", "thermal_time_s"})
-    refuse(table.optional(key));
+    reject(table.optional(key));
 }
 
 /// Mandatory limits. Only the manufacturer knows what the device may apply to a hand.
@@ -98,11 +98,11 @@ void read_limits(TomlTable& table, DeviceProfile& p, const Capabilities& capabil
   if (capabilities.output)
     force.number(p.max_force_N, {0.01, kAbsoluteMaxForce_N});
   else if (force)
-    force.refuse("the device takes no force: there is no wrench_report; leave it out");
+    force.reject("the device takes no force: there is no wrench_report; leave it out");
   if (capabilities.torque)
     torque.number(p.max_torque_Nm, {0.001, kAbsoluteMaxTorque_Nm});
   else if (torque)
-    torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
+    torque.reject("the device takes no torque; leave it out, or give wrench_report its field");
   if (!capabilities.output) p.max_force_N = 0.0;
   if (!capabilities.torque) p.max_torque_Nm = 0.0;
   table.mandatory("max_linear_speed_m_per_s").number(p.max_linear_speed_m_per_s, {0.01, 10});
@@ -147,7 +147,7 @@ void read_button(const TomlValue& value, int& button, const DeviceProfile& p) {
     return;
   }
   const std::string known = buttons_text(p);
-  value.refuse(known.empty() ? "no report carries buttons; give pose_report its 'buttons', or leave this out"
+  value.reject(known.empty() ? "no report carries buttons; give pose_report its 'buttons', or leave this out"
                              : "no report carries a button of this number; they carry " + known);
 }
 
@@ -167,18 +167,18 @@ void read_buttons(TomlTable& table, DeviceProfile& p) {
   for (std::size_t i = 0; i < meanings.size(); ++i) {
     const auto& [name, button, value, ends_force] = meanings[i];
     if (is_stated(value) && ends_force && !p.has_output) {
-      value.refuse("the device has no motors, and no force to end: there is no wrench_report; leave it out");
+      value.reject("the device has no motors, and no force to end: there is no wrench_report; leave it out");
       continue;
     }
     if (is_stated(value) && button == &p.slow_button &&
         !(p.deflection && p.deflection->mode == Deflection::Mode::rate)) {
-      value.refuse("a slow button requires [deflection] with mode \"rate\"; leave it out");
+      value.reject("a slow button requires [deflection] with mode \"rate\"; leave it out");
       continue;
     }
     read_button(value, *button, p);
     for (std::size_t k = 0; k < i; ++k)
       if (*button >= 0 && *button == *meanings[k].button)
-        value.refuse(std::string("is the ") + meanings[k].name +
+        value.reject(std::string("is the ") + meanings[k].name +
                      " button as well; a button means one thing, so name another");
   }
 }
@@ -220,7 +220,7 @@ void read_usb_ids(const TomlValue& list, std::vector<UsbId>& ids) {
     if (const auto id = usb_id(text))
       ids.push_back(*id);
     else
-      element.refuse_found("vendor and product as four hexadecimal digits each, as in \"046d:c626\"");
+      element.reject_found("vendor and product as four hexadecimal digits each, as in \"046d:c626\"");
   }
 }
 
@@ -234,16 +234,16 @@ void read_match(TomlTable& table, DeviceMatch& match) {
   const TomlValue by_layout = table.optional("usb_by_layout");
   read_usb_ids(usb, match.usb);
   read_usb_ids(by_layout, match.usb_by_layout);
-  if (!usb && !by_layout) usb.refuse("is missing; name at least one device, as in usb = [\"046d:c626\"]");
+  if (!usb && !by_layout) usb.reject("is missing; name at least one device, as in usb = [\"046d:c626\"]");
   if (usb.is_array() && match.usb.empty() && !by_layout && usb.elements("").empty())
-    usb.refuse("is empty; name at least one device, as in usb = [\"046d:c626\"]");
+    usb.reject("is empty; name at least one device, as in usb = [\"046d:c626\"]");
   table.optional("serial").text(match.serial);
   table.optional("only_when_named").boolean(match.only_when_named);
   const TomlValue page = table.optional("usage_page");
   read_id16(page, match.usage_page);
   const TomlValue usage = table.optional("usage");
   read_id16(usage, match.usage);
-  if (usage && !page) usage.refuse("has no effect without usage_page; state both");
+  if (usage && !page) usage.reject("has no effect without usage_page; state both");
 }
 
 void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
@@ -255,7 +255,7 @@ void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
   const TomlValue firmware = table.optional("firmware");
   firmware.text(endpoints.firmware);
   if (firmware && !endpoints.serial_chip)
-    firmware.refuse("is loaded through a serial chip; state serial_chip = \"ftdi\", or leave it out");
+    firmware.reject("is loaded through a serial chip; state serial_chip = \"ftdi\", or leave it out");
 }
 
 // --- frames -----------------------------------------------------------------------------------------------
@@ -282,7 +282,7 @@ void read_frames(TomlTable& table, DeviceProfile& p) {
   const auto rows = axes.elements("an array of three axes, as in [\"-y\", \"-x\", \"-z\"]");
   Matrix3d R = Matrix3d::Identity();
   bool good = rows.size() == 3;
-  if (axes.is_array() && !good) axes.refuse_found("three axes, as in [\"-y\", \"-x\", \"-z\"]");
+  if (axes.is_array() && !good) axes.reject_found("three axes, as in [\"-y\", \"-x\", \"-z\"]");
   for (std::size_t i = 0; i < rows.size() && i < 3; ++i) {
     Vector3d row;
     if (read_axis(rows[i], row))
@@ -291,7 +291,7 @@ void read_frames(TomlTable& table, DeviceProfile& p) {
       good = false;
   }
   if (good && std::abs(R.determinant() - 1.0) > 0.5)
-    axes.refuse(
+    axes.reject(
         "the axes are not right-handed, or one is used twice; x forward, y left and z up, each named by an "
         "axis "
         "of the device");
@@ -313,14 +313,14 @@ void read_pose_limits(TomlTable& table, Deflection& d) {
   if (is_stated(reach)) reach.number(d.reach_m, {1e-3, 10});
   if (is_stated(least) != is_stated(most))
     (is_stated(least) ? least : most)
-        .refuse("is one of two corners: state box_min_m and box_max_m, or neither");
+        .reject("is one of two corners: state box_min_m and box_max_m, or neither");
   if (!is_stated(least) || !is_stated(most)) return;
   if (!is_stated(reach)) d.reach_m = Deflection::kUnbounded;
   if (!least.vector(d.box_min_m, {-10, 10}) || !most.vector(d.box_max_m, {-10, 10})) return;
   if (d.box_min_m.maxCoeff() > 0.0)
-    least.refuse("the pose starts at 0, which must be inside of the box; no number may be above 0");
+    least.reject("the pose starts at 0, which must be inside of the box; no number may be above 0");
   if (d.box_max_m.minCoeff() < 0.0)
-    most.refuse("the pose starts at 0, which must be inside of the box; no number may be below 0");
+    most.reject("the pose starts at 0, which must be inside of the box; no number may be below 0");
 }
 
 /// Optional response of a puck. "none" removes an inherited value.
@@ -336,9 +336,9 @@ void read_steering(TomlTable& table, Deflection& d) {
     if (!is_stated(value)) return;
     if (d.mode != Deflection::Mode::rate) {
       if (!value.is_inherited())
-        value.refuse("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
+        value.reject("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
     } else if (needs_full_scale && !has_full_scale) {
-      value.refuse("needs the full deflection of the puck; state full_deflection_m and full_deflection_rad");
+      value.reject("needs the full deflection of the puck; state full_deflection_m and full_deflection_rad");
     } else {
       value.number(out, range);
     }
@@ -352,7 +352,7 @@ void read_steering(TomlTable& table, Deflection& d) {
   read(angle, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
   if (is_stated(distance) == is_stated(angle)) return;
   (is_stated(distance) ? distance : angle)
-      .refuse("is one of two: state max_proxy_distance_m and max_proxy_angle_rad, or neither");
+      .reject("is one of two: state max_proxy_distance_m and max_proxy_angle_rad, or neither");
 }
 
 void read_deflection(TomlTable& table, DeviceProfile& p) {
@@ -373,9 +373,9 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
                                {"once", ReferenceSchedule::once},
                                {"each_start", ReferenceSchedule::each_start}});
   table.optional("check_axes").boolean(p.check_axes);
-  const TomlValue position = table.optional("rest_position_m");
-  const TomlValue rotation = table.optional("rest_rotation_vector_rad");
-  p.has_rest_pose = position || rotation;
+  const TomlValue position = table.optional("reference_position_m");
+  const TomlValue rotation = table.optional("reference_rotation_vector_rad");
+  p.has_reference_pose = position || rotation;
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
@@ -389,11 +389,11 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   most.vector(plan.workspace_max_m, {-2, 2});
   const double least = (plan.workspace_max_m - plan.workspace_min_m).minCoeff();
   if (least < plan.travel_m)
-    most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
+    most.reject("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
                 ", along each axis; along one it is " + to_text(least));
   const TomlValue turns = table.optional("max_rotation_rad");
   turns.number(plan.max_rotation_rad, {0.01, 4});
-  if (plan.max_rotation_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
+  if (plan.max_rotation_rad < plan.travel_rad) turns.reject("must be no less than travel_rad");
 }
 
 void read_masses(TomlTable& table, MovingMasses& masses) {
@@ -414,7 +414,7 @@ void read_keep_alive(TomlTable& table, DeviceProfile& p) {
 void read_more_reports(const TomlValue& list, DeviceProfile& p) {
   constexpr std::size_t kMost = 16;
   const auto reports = list.elements("tables, each headed [[more_reports]]");
-  if (reports.size() > kMost) list.refuse("has more than 16 reports; name only those that matter");
+  if (reports.size() > kMost) list.reject("has more than 16 reports; name only those that matter");
   for (const TomlValue& report : reports) {
     PoseReportLayout& layout = p.more_reports.emplace_back();
     report.table(read_more_report, layout, p);
@@ -423,7 +423,7 @@ void read_more_reports(const TomlValue& list, DeviceProfile& p) {
 
 void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue name = table.mandatory("name");
-  if (name.text(p.name) && p.name.empty()) name.refuse("must not be empty; status and records show it");
+  if (name.text(p.name) && p.name.empty()) name.reject("must not be empty; status and records show it");
   table.optional("description").text(p.description);
   table.mandatory("transport")
       .choice(
@@ -441,7 +441,7 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue watchdog =
       capabilities.output ? table.mandatory("watchdog_s") : table.optional("watchdog_s");
   if (!capabilities.output && watchdog)
-    watchdog.refuse("the device has no motors: there is no wrench_report; leave it out");
+    watchdog.reject("the device has no motors: there is no wrench_report; leave it out");
   else if (!watchdog.is_text("none"))
     watchdog.number(p.watchdog_s, {0.001, 2});
   table.optional("stale_fault_s").number(p.stale_fault_s, {0.001, 1});
@@ -455,7 +455,7 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
       p.transport == Transport::libusb ? table.mandatory("endpoints") : table.optional("endpoints");
   endpoints.table(read_endpoints, p.endpoints);
   if (endpoints && p.transport != Transport::libusb)
-    endpoints.refuse("only transport = \"libusb\" speaks to endpoints; choose it, or leave this out");
+    endpoints.reject("only transport = \"libusb\" uses endpoints; select it, or leave this out");
   table.optional("frames").table(read_frames, p);
   table.mandatory("limits").table(read_limits, p, capabilities);
   table.optional("closed_loop").table(read_closed_loop, p);
@@ -463,9 +463,9 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue masses = table.optional("masses");
   masses.table(read_masses, p.masses);
   if (masses && !capabilities.output)
-    masses.refuse("the device has no motors to hold them, because there is no wrench_report; leave it out");
+    masses.reject("the device has no motors to hold them, because there is no wrench_report; leave it out");
   if (masses && p.wrench_point == WrenchPoint::world_origin)
-    masses.refuse(
+    masses.reject(
         "gravity compensation acts about the handle point; leave out wrench_point = \"world_origin\", or "
         "this");
   table.optional("deflection").table(read_deflection, p);
@@ -480,7 +480,7 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue keep_alive = table.optional("keep_alive");
   keep_alive.table(read_keep_alive, p);
   if (keep_alive && p.stream == StreamStyle::lock_step)
-    keep_alive.refuse("a lock-step device receives commands all the time; leave it out");
+    keep_alive.reject("a lock-step device receives commands all the time; leave it out");
   table.optional("buttons").table(read_buttons, p);
   check_pose_complete(pose_report, p);
   check_distinguishable(pose_report, more_reports, p);

@@ -61,7 +61,7 @@ void check_reach(const TomlValue& step, const ReportField& field, double reach) 
   const double counts = std::ldexp(1.0, static_cast<int>(field.bits) - (field.is_signed ? 1 : 0)) - 1.0;
   const double largest = std::abs(field.step) * counts;
   if (!(largest < reach)) return;
-  step.refuse(std::to_string(field.bits) + " bits with this step reach " + step.with_unit(largest) +
+  step.reject(std::to_string(field.bits) + " bits with this step reach " + step.with_unit(largest) +
               ", less than the " + step.with_unit(reach) +
               " it has to carry; use a larger step or a wider type");
 }
@@ -79,10 +79,10 @@ bool read_width(TomlTable& table, ReportField& field, const FieldShape& shape) {
   const TomlValue bits = table.optional("bits");
   const TomlValue is_signed = table.optional("signed");
   if (type && bits) {
-    bits.refuse("the type determines the width; leave one of the two out");
+    bits.reject("the type determines the width; leave one of the two out");
     return false;
   }
-  if (type && is_signed) is_signed.refuse("the type determines the sign; leave this out, or give bits");
+  if (type && is_signed) is_signed.reject("the type determines the sign; leave this out, or give bits");
   if (!bits) return read_type(type, shape, field);
   field.is_signed = shape.is_signed;
   is_signed.boolean(field.is_signed);
@@ -100,11 +100,11 @@ bool read_coding(TomlTable& table, ReportField& field) {
   if (field.coding == Coding::nibble_ascii) field.base = kNibbleA;
   table.optional("base").integer(field.base, {0, 255});
   if (field.coding == Coding::nibble_ascii && (field.bits % kBitsPerNibble != 0 || field.bit != 0)) {
-    coding.refuse("a nibble holds 4 bits and starts at bit 0; use bits = 4, 8, 12, 16 and so on");
+    coding.reject("a nibble holds 4 bits and starts at bit 0; use bits = 4, 8, 12, 16 and so on");
     return false;
   }
   if (field.coding == Coding::binary && field.big_endian && (field.bits % 8 != 0 || field.bit != 0)) {
-    order.refuse("big_endian is for whole bytes; use bits = 8, 16, 24 and so on, and bit = 0");
+    order.reject("big_endian is for whole bytes; use bits = 8, 16, 24 and so on, and bit = 0");
     return false;
   }
   return true;
@@ -114,7 +114,7 @@ void read_sign(TomlTable& table, ReportField& field) {
   const TomlValue value = table.optional("sign");
   int sign = 1;
   if (!value.integer(sign, {-1, 1})) return;
-  if (sign == 0) return value.refuse("must be 1, or -1 to turn the axes round");
+  if (sign == 0) return value.reject("must be 1, or -1 to turn the axes round");
   field.step *= sign;
 }
 
@@ -167,7 +167,7 @@ class FrameReader {
     const TomlValue least = table.optional("min_length");
     if (least.integer(layout.min_length, {shortest, static_cast<double>(length)}) &&
         layout.checksum != Checksum::none)
-      least.refuse("a report with a checksum is never short; leave one of the two out");
+      least.reject("a report with a checksum is never short; leave one of the two out");
     end_bit_ = 8 * length;
     read_checksum_place(table, length);
     read_constants(table.optional("constants"));
@@ -189,7 +189,7 @@ class FrameReader {
 
   void bits(const TomlValue& list, std::vector<ReportBit>& bits, std::size_t most) {
     const auto elements = list.elements("an array of bits, each as in { byte = 1, bit = 0 }");
-    if (elements.size() > most) return list.refuse("has more than " + std::to_string(most) + " bits");
+    if (elements.size() > most) return list.reject("has more than " + std::to_string(most) + " bits");
     for (const TomlValue& element : elements) {
       ReportBit read;
       bit(element, read);
@@ -228,7 +228,7 @@ class FrameReader {
   };
 
   static void read_name(const TomlValue& value, std::string& name) {
-    if (value.text(name) && name.empty()) value.refuse("must not be empty; it is what people read");
+    if (value.text(name) && name.empty()) value.reject("must not be empty; it is what people read");
   }
 
   void read_checksum_place(TomlTable& table, std::size_t length) {
@@ -236,8 +236,8 @@ class FrameReader {
     const TomlValue at = table.optional("checksum_at");
     const TomlValue from = table.optional("checksum_from");
     if (width == 0) {
-      if (at) at.refuse("there is no checksum; name one, or leave this out");
-      if (from) from.refuse("there is no checksum; name one, or leave this out");
+      if (at) at.reject("there is no checksum; name one, or leave this out");
+      if (from) from.reject("there is no checksum; name one, or leave this out");
       return;
     }
     std::size_t slot = length >= width ? length - width : 0;
@@ -256,7 +256,7 @@ class FrameReader {
       if (!element.numbers(pair, {0, 255})) continue;
       const auto byte = static_cast<std::size_t>(pair[0]);
       if (static_cast<double>(byte) != pair[0] || std::trunc(pair[1]) != pair[1]) {
-        element.refuse_found("two whole numbers, the byte and its value");
+        element.reject_found("two whole numbers, the byte and its value");
         continue;
       }
       layout_.constants.push_back({byte, static_cast<std::uint8_t>(pair[1])});
@@ -267,14 +267,14 @@ class FrameReader {
   void claim(const TomlValue& value, std::size_t begin, std::size_t bits) {
     const std::size_t end = begin + bits;
     if (end > end_bit_) {
-      value.refuse("its last byte is " + std::to_string((end - 1) / 8) + ", but fields end with byte " +
+      value.reject("its last byte is " + std::to_string((end - 1) / 8) + ", but fields end with byte " +
                    std::to_string(end_bit_ / 8 - 1) + " at the latest; move it, or lengthen the report");
     }
     if (begin < 8 * first_byte())
-      value.refuse("byte 0 is the report id; move it, or state id = \"none\" if the device uses no ids");
+      value.reject("byte 0 is the report id; move it, or state id = \"none\" if the device uses no ids");
     for (const Claim& other : claims_) {
       if (begin < other.end && other.begin < end) {
-        value.refuse("overlaps '" + other.name + "', which has bytes " + std::to_string(other.begin / 8) +
+        value.reject("overlaps '" + other.name + "', which has bytes " + std::to_string(other.begin / 8) +
                      " to " + std::to_string((other.end - 1) / 8) + "; move one of them");
       }
     }
@@ -295,10 +295,10 @@ void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const
   const TomlValue buttons = table.optional("buttons");
   frame.field(buttons, r.buttons, {});
   if (r.buttons.present && r.buttons.bits > 32)
-    buttons.refuse("has more than 32 buttons; list those that matter");
+    buttons.reject("has more than 32 buttons; list those that matter");
   const TomlValue list = table.optional("button_list");
   frame.bits(list, r.button_bits, 32);
-  if (r.buttons.present && list) list.refuse("the buttons are a mask already; leave one of the two out");
+  if (r.buttons.present && list) list.reject("the buttons are a mask already; leave one of the two out");
   frame.field(table.optional("acknowledged"), r.acknowledged, {});
   frame.bits(table.optional("homed"), r.homed, 32);
   frame.field(table.optional("translation"), r.translation, {3, true, "step_m"});
@@ -364,18 +364,18 @@ void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValu
   frame.field(force, r.force, {3, true, "step_N", profile.max_force_N});
   frame.field(torque, r.torque, {3, true, "step_Nm", profile.max_torque_Nm});
   if (whole && force.is_text("none"))
-    force.refuse("a device without force has no wrench report; state wrench_report = \"none\" above");
+    force.reject("a device without force has no wrench report; state wrench_report = \"none\" above");
   if (!whole && (r.force.present || r.torque.present))
-    efforts.refuse("replaces force and torque; leave one of the two out");
+    efforts.reject("replaces force and torque; leave one of the two out");
   const bool amperes = profile.kinematics.kind != Kinematics::Kind::delta;
   frame.field(efforts, r.efforts,
               {kMaxMotors, true, amperes ? "step_A" : "step", profile.kinematics.max_effort, !amperes});
   if (!whole && profile.kinematics.kind == Kinematics::Kind::none)
-    efforts.refuse("need [kinematics], by which they are computed; state it");
+    efforts.reject("need [kinematics], by which they are computed; state it");
   frame.field(key("hold_time"), r.hold_time, {1, false, "step_s"});
   const TomlValue stencil = table.optional("template");
   if (read_bytes(stencil, r.template_bytes) && r.template_bytes.size() != r.length) {
-    stencil.refuse("has " + std::to_string(r.template_bytes.size()) + " bytes, but the report has " +
+    stencil.reject("has " + std::to_string(r.template_bytes.size()) + " bytes, but the report has " +
                    std::to_string(r.length) + "; give one for each");
   }
 }
@@ -391,17 +391,17 @@ void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& prof
   const bool pose = any(&PoseReportLayout::position) || any(&PoseReportLayout::orientation);
   const bool kinematics = profile.kinematics.kind != Kinematics::Kind::none;
   if (static_cast<int>(joints) + static_cast<int>(puck) + static_cast<int>(pose) > 1)
-    pose_report.refuse(
+    pose_report.reject(
         "a device sends poses (position, orientation), or joints, or a deflection (translation, rotation); "
         "leave all but one out");
   else if (joints && !kinematics)
-    pose_report.refuse("joints make a pose only by [kinematics]; state it");
+    pose_report.reject("joints make a pose only by [kinematics]; state it");
   else if (kinematics && !joints && (puck || pose))
-    pose_report.refuse("[kinematics] needs joints in a report, or must be left out");
+    pose_report.reject("[kinematics] needs joints in a report, or must be left out");
   else if (puck && !profile.deflection)
-    pose_report.refuse("a translation or rotation moves a pose only by [deflection]; state it");
+    pose_report.reject("a translation or rotation moves a pose only by [deflection]; state it");
   else if (profile.deflection && !puck && (joints || pose))
-    pose_report.refuse("[deflection] needs a translation or rotation in a report, or must be left out");
+    pose_report.reject("[deflection] needs a translation or rotation in a report, or must be left out");
 }
 
 void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_reports,
@@ -415,9 +415,9 @@ void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_r
       const std::string other = j == 0 ? pose_report.name() : elements[j - 1].name();
       if (a.length == 0 || b.length == 0) continue;  // rejected before
       if (a.has_id != b.has_id)
-        elements[i - 1].refuse("'" + other + "' and this one must both have an id, or neither");
+        elements[i - 1].reject("'" + other + "' and this one must both have an id, or neither");
       else if (!told_apart(a, b))
-        elements[i - 1].refuse("cannot be distinguished from '" + other + "': same " +
+        elements[i - 1].reject("cannot be distinguished from '" + other + "': same " +
                                (a.has_id ? "id" : "length") + "; a report is known by its " +
                                (a.has_id ? "id" : "length"));
     }

@@ -35,7 +35,7 @@ void read_kind(const TomlValue& value, GeneratedMesh& generated) {
   const NearestKey nearest = nearest_key(generated.kind, known);
   std::string all;
   for (const KnownKey& key : known) all += (all.empty() ? "" : ", ") + key.name;
-  value.refuse("no generated mesh of kind '" + printable(generated.kind) + "'; " +
+  value.reject("no generated mesh of kind '" + printable(generated.kind) + "'; " +
                (nearest.name.empty() ? "there are " + all : nearest.advice));
 }
 
@@ -47,11 +47,11 @@ void read_generated(TomlTable& table, GeneratedMesh& generated) {
   const TomlValue seed = table.optional("seed");
   seed.integer(generated.seed, {0, 4294967295.0});
   if (seed && generated.kind != "bumpy" && generated.kind != "boulder")
-    seed.refuse("only bumpy and boulder are random; leave it out");
+    seed.reject("only bumpy and boulder are random; leave it out");
   const TomlValue size = table.optional("size_m");
   size.vector(generated.size_m, kSide);
   if (size && generated.kind != "box")
-    size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
+    size.reject("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
 /// Reads a mesh file name, or a table that describes a generated mesh.
@@ -66,7 +66,7 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
   mesh = scene.file.parent_path() / mesh;
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
-  value.refuse(
+  value.reject(
       "no such file; searched " + fs::absolute(mesh).lexically_normal().string() +
       "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as in { make "
       "= \"gear\" }");
@@ -79,7 +79,7 @@ void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass
   const TomlValue mass = table.optional("mass", "kg");
   mass.number(scene.tool.mass_kg, kMass);
   top_mass.number(scene.tool.mass_kg, kMass);
-  if (mass && top_mass) mass.refuse("is also given at the top of the file; keep one of the two");
+  if (mass && top_mass) mass.reject("is also given at the top of the file; keep one of the two");
 }
 
 /// Reads normal . x < offset. Scales normal and offset to a unit normal, so the set of points does not
@@ -89,7 +89,7 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   const TomlValue normal = table.mandatory("normal");
   if (!normal.vector(half_space.normal_W, kAny)) return;
   const double length = half_space.normal_W.norm();
-  if (length < kMinNormal) return normal.refuse("must not be zero; it points out of the solid");
+  if (length < kMinNormal) return normal.reject("must not be zero; it points out of the solid");
   half_space.normal_W /= length;
   half_space.offset_m /= length;
 }
@@ -106,7 +106,7 @@ bool read_velocity(const TomlValue& key, double fastest, Vector3d& velocity) {
   if (!key.vector(velocity, {-fastest, fastest})) return false;
   const double speed = velocity.norm();
   if (speed <= fastest) return true;
-  key.refuse("has the length " + key.with_unit(speed) + "; give one of no more than " +
+  key.reject("has the length " + key.with_unit(speed) + "; give one of no more than " +
              key.with_unit(fastest));
   return false;
 }
@@ -118,7 +118,7 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
       keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
   const bool reverses = keys.reverse_after.number(motion.reverse_after_s, kReversal_s);
   if (reverses && linear_is_good && angular_is_good && !motion.moves())
-    keys.reverse_after.refuse(
+    keys.reverse_after.reject(
         "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
         "out");
 }
@@ -150,14 +150,14 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
                          table.optional("reverse_after_s")};
   if (mesh) {
     if (half_space)
-      half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
+      half_space.reject("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
     return read_mesh_obstacle(mesh, keys, scene, name);
   }
-  if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
+  if (keys.kind) keys.kind.reject("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
-    if (key) key.refuse("belongs to a mesh; a half_space is defined by normal and offset");
+    if (key) key.reject("belongs to a mesh; a half_space is defined by normal and offset");
   for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.reverse_after})
-    if (key) key.refuse("belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle");
+    if (key) key.reject("belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
   if (half_space) scene.half_spaces.push_back(settings);
@@ -183,7 +183,7 @@ void read_added(TomlTable& table, SceneSettings& scene) {
   std::string name;
   const TomlValue key = table.optional("name");
   if (key.text(name) && has_name(scene, name))
-    key.refuse("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
+    key.reject("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
   for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
     if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
   read_obstacle(table, scene, name);

@@ -37,7 +37,7 @@ class Reader {
  public:
   explicit Reader(std::string name) : name_(std::move(name)) {}
 
-  void refuse(std::size_t line, std::size_t column, const std::string& message) {
+  void reject(std::size_t line, std::size_t column, const std::string& message) {
     if (count_++ >= kMostMessages) return;
     text_ += (text_.empty() ? "" : "\n") + name_ + ':' + std::to_string(line) + ':' + std::to_string(column) +
              ": " + message;
@@ -56,7 +56,7 @@ class Reader {
       text.remove_prefix(1);  // from_chars accepts no plus
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
     if (error == std::errc{} && end == text.data() + text.size() && is_finite(out)) return true;
-    refuse(line, column, std::string(what) + " must be a finite number, found " + found);
+    reject(line, column, std::string(what) + " must be a finite number, found " + found);
     return false;
   }
 
@@ -88,7 +88,7 @@ std::string header_of(Columns columns) {
 bool read_pose(Reader& reader, Columns columns, std::string_view text, std::size_t line, TimedPose& out) {
   const auto fields = fields_of(text);
   if (fields.size() != columns.size()) {
-    reader.refuse(line, 1,
+    reader.reject(line, 1,
                   "expected " + std::to_string(columns.size()) + " numbers (" + header_of(columns) +
                       "), found " + std::to_string(fields.size()) +
                       (fields.size() == 1 ? "; separate them with commas" : ""));
@@ -102,7 +102,7 @@ bool read_pose(Reader& reader, Columns columns, std::string_view text, std::size
   const double* const x = numbers.data() + first;
   for (std::size_t i = 0; i < 3 && good; ++i) {
     if (std::abs(x[i]) <= kFarthest_m) continue;
-    reader.refuse(
+    reader.reject(
         line, fields[first + i].first,
         std::string(columns[first + i]) + " is " + to_text(x[i]) + ", farther out than 1e9 m; give metres");
     good = false;
@@ -110,7 +110,7 @@ bool read_pose(Reader& reader, Columns columns, std::string_view text, std::size
   if (!good) return false;
   const Quaterniond q(x[6], x[3], x[4], x[5]);
   if (!(std::abs(q.norm() - 1.0) <= kNormTolerance)) {
-    reader.refuse(
+    reader.reject(
         line, fields[first + 3].first,
         "the quaternion qx,qy,qz,qw has norm " + to_text(q.norm()) + "; it must be 1 (is the scalar last?)");
     return false;
@@ -133,19 +133,19 @@ void check_step(Reader& reader, std::size_t line, const TimedPose& from, const T
   const double distance_m = (to.X.translation_m - from.X.translation_m).norm();
   const double rotation_rad = from.X.rotation.angularDistance(to.X.rotation);
   if (!(h_s > 0.0))
-    reader.refuse(line, 1,
+    reader.reject(line, 1,
                   "time_s is " + to_text(to.time_s) + ", and " + to_text(from.time_s) +
                       " in the line before; times must ascend: sort the lines, and leave out repeated ones");
   else if (h_s > kMaxTableGap_s)
-    reader.refuse(line, 1,
+    reader.reject(line, 1,
                   "a gap of " + to_text(h_s) + " s; give a pose at least every " + to_text(kMaxTableGap_s) +
                       " s, or use a hand script, which interpolates between distant waypoints");
   else if (distance_m > kMaxTableSpeed_m_per_s * h_s)
-    reader.refuse(line, 1,
+    reader.reject(line, 1,
                   "a jump of " + to_text(distance_m) + " m in " + to_text(h_s) +
                       " s, which no hand makes; give metres and seconds");
   else if (rotation_rad > kMaxTableRotation_rad)
-    reader.refuse(line, 1,
+    reader.reject(line, 1,
                   "a rotation of " + to_text(rotation_rad) +
                       " rad in one step; add poses between, so that the "
                       "direction of rotation is unique");
@@ -164,7 +164,7 @@ std::vector<TimedPose> read_table(std::istream& in, const std::string& name, Col
     if (trimmed(line).empty()) continue;
     if (!header) {
       if (!is_header(columns, line)) {
-        reader.refuse(number, 1,
+        reader.reject(number, 1,
                       "expected the header '" + header_of(columns) + "', found '" +
                           printable(std::string(trimmed(line))) + "'");
         reader.throw_if_any();
@@ -178,9 +178,9 @@ std::vector<TimedPose> read_table(std::istream& in, const std::string& name, Col
     poses.push_back(pose);
   }
   if (!header)
-    reader.refuse(1, 1, "is empty; expected the header '" + header_of(columns) + "'");
+    reader.reject(1, 1, "is empty; expected the header '" + header_of(columns) + "'");
   else if (timed && poses.empty())
-    reader.refuse(number, 1, "has no poses; give at least one line after the header");
+    reader.reject(number, 1, "has no poses; give at least one line after the header");
   reader.throw_if_any();
   return poses;
 }

@@ -24,7 +24,7 @@ bool parts(char c) {
 
 ReportBytes parse_bytes(std::string_view text) {
   ReportBytes parsed;
-  const auto refuse = [&](std::size_t at, std::string_view problem) {
+  const auto reject = [&](std::size_t at, std::string_view problem) {
     parsed.error_index = at;
     parsed.error = problem;
     return parsed;
@@ -35,9 +35,9 @@ ReportBytes parse_bytes(std::string_view text) {
       continue;
     }
     if (text[i] == '0' && i + 1 < text.size() && (text[i + 1] == 'x' || text[i + 1] == 'X')) i += 2;
-    if (i >= text.size() || digit(text[i]) < 0) return refuse(i, "is not a hexadecimal digit");
+    if (i >= text.size() || digit(text[i]) < 0) return reject(i, "is not a hexadecimal digit");
     if (i + 1 >= text.size() || digit(text[i + 1]) < 0)
-      return refuse(i, "is a single digit; a byte is two hexadecimal digits, as in 0a");
+      return reject(i, "is a single digit; a byte is two hexadecimal digits, as in 0a");
     parsed.bytes.push_back(static_cast<std::uint8_t>(16 * digit(text[i]) + digit(text[i + 1])));
     i += 2;
   }
@@ -49,12 +49,12 @@ bool read_bytes(const TomlValue& value, std::vector<std::uint8_t>& out) {
   if (!value.text(text)) return false;
   const ReportBytes parsed = parse_bytes(text);
   if (!parsed.error.empty()) {
-    value.refuse("character " + std::to_string(parsed.error_index + 1) + " " + std::string(parsed.error) +
+    value.reject("character " + std::to_string(parsed.error_index + 1) + " " + std::string(parsed.error) +
                  "; write bytes as in \"04 00\"");
     return false;
   }
   if (parsed.bytes.empty() || parsed.bytes.size() > kMaxReportBytes) {
-    value.refuse("has " + std::to_string(parsed.bytes.size()) + " bytes; a report has 1 to " +
+    value.reject("has " + std::to_string(parsed.bytes.size()) + " bytes; a report has 1 to " +
                  std::to_string(kMaxReportBytes));
     return false;
   }

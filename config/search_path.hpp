@@ -31,7 +31,7 @@ class SearchPath {
                                             const std::filesystem::path& named_in = {}) const;
   /// The first existing candidate; throws ConfigError with all candidates if none exists.
   std::filesystem::path require(const std::filesystem::path& name) const;
-  /// The message "no such file; looked for A, B, C".
+  /// The message "no such file; searched A, B, C".
   std::string not_found(const std::filesystem::path& name, const std::filesystem::path& named_in = {}) const;
 
  private:

@@ -25,7 +25,7 @@ constexpr Range kCoefficient = {0, FrictionSettings::kMaxCoefficient};
 bool find_file(const TomlValue& value, const Context& context, fs::path& name) {
   const auto found = context.search.find(name, context.file);
   if (!found) {
-    value.refuse(context.search.not_found(name, context.file));
+    value.reject(context.search.not_found(name, context.file));
     return false;
   }
   name = *found;
@@ -65,13 +65,13 @@ void check_semidefinite(const TomlValue& value, const Matrix6d& K) {
   const Matrix6d symmetric = 0.5 * (K + K.transpose());
   const double smallest = Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric).eigenvalues().minCoeff();
   if (smallest >= -1e-9 * symmetric.norm()) return;
-  value.refuse("its symmetric part has the eigenvalue " + to_text(smallest) +
+  value.reject("its symmetric part has the eigenvalue " + to_text(smallest) +
                "; it must have none below 0, because the law would push instead of hold");
 }
 
 bool read_gain_matrix(const TomlValue& value, Matrix6d& K) {
   const auto rows = value.elements("6 rows");
-  if (rows.size() != 6) return value.refuse_found("6 rows of 6 numbers");
+  if (rows.size() != 6) return value.reject_found("6 rows of 6 numbers");
   Matrix6d read;
   bool good = true;
   for (int i = 0; i < 6; ++i) {
@@ -108,7 +108,7 @@ bool read_gain(const TomlValue& value, const GainKeys& keys, Matrix6d& K) {
 bool read_directory(const TomlValue& value, fs::path& directory) {
   if (!value.path(directory)) return false;
   if (directory.empty() || directory.is_absolute()) return true;
-  value.refuse("expected an absolute path, found \"" + printable(directory.string()) +
+  value.reject("expected an absolute path, found \"" + printable(directory.string()) +
                "\"; a service has no working directory of its own");
   return false;
 }
@@ -116,7 +116,7 @@ bool read_directory(const TomlValue& value, fs::path& directory) {
 bool read_socket(const TomlValue& value, std::string& socket) {
   if (!value.text(socket)) return false;
   if (socket.empty() || socket == kNoSocket || socket.front() == '/') return true;
-  value.refuse("expected an absolute path, or \"" + std::string(kNoSocket) + "\", found \"" +
+  value.reject("expected an absolute path, or \"" + std::string(kNoSocket) + "\", found \"" +
                printable(socket) + "\"; clients and daemon must use the same file");
   return false;
 }
@@ -124,7 +124,7 @@ bool read_socket(const TomlValue& value, std::string& socket) {
 /// wrenchd checks at its start that the group exists; a configuration may be checked on another machine.
 bool read_privileged_group(const TomlValue& value, std::string& group) {
   if (!value.text(group)) return false;
-  if (group == kEverybody) value.refuse("only observers may be everybody; name a group");
+  if (group == kEverybody) value.reject("only observers may be everybody; name a group");
   return true;
 }
 
@@ -305,7 +305,7 @@ void check_friction(const SectionValues& values, Settings& settings) {
   if (has_static && !dynamic) friction.dynamic_coefficient = friction.static_coefficient;
   if (values.valid("dynamic") && !has_static) friction.static_coefficient = friction.dynamic_coefficient;
   if (friction.dynamic_coefficient > friction.static_coefficient)
-    dynamic.refuse("expected no more than 'static', " + to_text(friction.static_coefficient) + ", found " +
+    dynamic.reject("expected no more than 'static', " + to_text(friction.static_coefficient) + ", found " +
                    to_text(friction.dynamic_coefficient) +
                    "; the dynamic coefficient of friction is not above the static one");
 }
@@ -313,7 +313,7 @@ void check_friction(const SectionValues& values, Settings& settings) {
 void check_rendering(const SectionValues& values, Settings& settings) {
   if (settings.rendering.friction.enabled() && settings.rendering.method != Method::exact)
     values.value("friction")
-        .refuse("only method = \"exact\" supports friction; choose it, or leave friction out");
+        .reject("only method = \"exact\" supports friction; choose it, or leave friction out");
 }
 
 struct Section {

@@ -51,7 +51,7 @@ std::string read_text(const fs::path& file) {
   return text;
 }
 
-void refuse_many_dots(const fs::path& file, std::string_view text) {
+void reject_many_dots(const fs::path& file, std::string_view text) {
   unsigned line = 1;
   while (!text.empty()) {
     const std::size_t length = std::min(text.find('\n'), text.size());
@@ -120,7 +120,7 @@ TomlNode read_toml_file(const fs::path& file) {
 }
 
 TomlNode read_toml_text(const std::string& text, const fs::path& file) {
-  refuse_many_dots(file, text);
+  reject_many_dots(file, text);
   try {
     return convert(file, toml::parse(std::string_view(text)), 0);
   } catch (const toml::parse_error& error) {

@@ -72,7 +72,7 @@ std::optional<double> TomlValue::number_in(Range range) const {
   if (!node_) return {};
   const auto x = as_number(*node_);
   if (x && inside(*x, range)) return x;
-  refuse_found("a number" + range_text(range));
+  reject_found("a number" + range_text(range));
   return {};
 }
 
@@ -80,7 +80,7 @@ std::optional<double> TomlValue::whole_number(Range range) const {
   if (!node_) return {};
   const auto x = as_number(*node_);
   if (x && inside(*x, range) && std::trunc(*x) == *x) return x;
-  refuse_found("a whole number" + range_text(range));
+  reject_found("a whole number" + range_text(range));
   return {};
 }
 
@@ -93,7 +93,7 @@ bool TomlValue::number(double& out, Range range) const {
 bool TomlValue::boolean(bool& out) const {
   if (!node_) return false;
   const bool* b = std::get_if<bool>(&node_->value);
-  if (!b) return refuse_found("true or false");
+  if (!b) return reject_found("true or false");
   out = *b;
   return true;
 }
@@ -101,7 +101,7 @@ bool TomlValue::boolean(bool& out) const {
 bool TomlValue::text(std::string& out) const {
   if (!node_) return false;
   const auto* s = std::get_if<std::string>(&node_->value);
-  if (!s) return refuse_found("a text between quotation marks");
+  if (!s) return reject_found("a text between quotation marks");
   out = *s;
   return true;
 }
@@ -109,7 +109,7 @@ bool TomlValue::text(std::string& out) const {
 bool TomlValue::path(std::filesystem::path& out) const {
   std::string name;
   if (!text(name)) return false;
-  if (name.find('\0') != std::string::npos) return refuse_found("a file name without a zero byte");
+  if (name.find('\0') != std::string::npos) return reject_found("a file name without a zero byte");
   out = name;
   return true;
 }
@@ -118,7 +118,7 @@ bool TomlValue::choose(std::size_t& index, std::span<const std::string_view> wor
   if (!node_) return false;
   const auto* word = std::get_if<std::string>(&node_->value);
   const auto found = word ? std::find(words.begin(), words.end(), *word) : words.end();
-  if (found == words.end()) return refuse_found(alternatives(words));
+  if (found == words.end()) return reject_found(alternatives(words));
   index = static_cast<std::size_t>(found - words.begin());
   return true;
 }
@@ -128,7 +128,7 @@ bool TomlValue::numbers(std::span<double> out, Range range) const {
   const std::string expected = "an array of " + std::to_string(out.size()) + " numbers";
   const auto values = elements(expected);
   if (!is_array()) return false;
-  if (values.size() != out.size()) return refuse_found(expected);
+  if (values.size() != out.size()) return reject_found(expected);
   std::vector<double> read(out.size());
   bool good = true;
   for (std::size_t i = 0; i < out.size(); ++i) good = values[i].number(read[i], range) && good;
@@ -144,20 +144,20 @@ std::vector<TomlValue> TomlValue::elements(std::string_view expected) const {
   std::vector<TomlValue> values;
   if (!node_) return values;
   const auto* array = std::get_if<TomlNode::Array>(&node_->value);
-  if (!array) refuse_found(std::string(expected));
+  if (!array) reject_found(std::string(expected));
   for (std::size_t i = 0; array && i < array->size(); ++i) {
     const TomlNode& node = (*array)[i];
-    values.emplace_back(*refusals_, &node, node.location, name_ + "[" + std::to_string(i) + "]", unit_);
+    values.emplace_back(*rejections_, &node, node.location, name_ + "[" + std::to_string(i) + "]", unit_);
   }
   return values;
 }
 
-void TomlValue::refuse(const std::string& message) const {
-  refusals_->add(location_, "key '" + name_ + "': " + message);
+void TomlValue::reject(const std::string& message) const {
+  rejections_->add(location_, "key '" + name_ + "': " + message);
 }
 
-bool TomlValue::refuse_found(const std::string& expected) const {
-  refuse("expected " + expected + ", found " + (node_ ? describe(*node_) : "nothing"));
+bool TomlValue::reject_found(const std::string& expected) const {
+  reject("expected " + expected + ", found " + (node_ ? describe(*node_) : "nothing"));
   return false;
 }
 
@@ -165,7 +165,7 @@ TomlValue TomlTable::optional(std::string_view key, std::string_view unit) {
   known_.push_back({std::string(key), std::string(unit.empty() ? unit_of(key) : unit)});
   const TomlEntry* entry = find(key);
   const SourceLocation place = entry ? entry->node.location : node_.location;
-  return {refusals_, entry ? &entry->node : nullptr, place, dotted(key), known_.back().unit};
+  return {rejections_, entry ? &entry->node : nullptr, place, dotted(key), known_.back().unit};
 }
 
 TomlValue TomlTable::mandatory(std::string_view key, std::string_view unit) {
@@ -179,20 +179,21 @@ TomlValue TomlTable::mandatory_unless(std::string_view other, std::string_view k
 }
 
 void TomlTable::close() {
-  for (const TomlEntry& entry : std::get<TomlNode::Table>(node_.value)) refuse_unknown(entry);
+  for (const TomlEntry& entry : std::get<TomlNode::Table>(node_.value)) reject_unknown(entry);
   for (const MissingKey& key : missing_) {
     const std::string cure = key.alternative.empty() ? "it has no default, so state it here"
                                                      : "state it, or '" + key.alternative + "', here";
-    refusals_.add(node_.location, "key '" + dotted(key.name) + "' is missing; " + cure);
+    rejections_.add(node_.location, "key '" + dotted(key.name) + "' is missing; " + cure);
   }
 }
 
 /// A misspelt mandatory key is reported as unknown only, not also as missing.
-void TomlTable::refuse_unknown(const TomlEntry& entry) {
+void TomlTable::reject_unknown(const TomlEntry& entry) {
   const auto same = [&](const KnownKey& key) { return key.name == entry.key; };
   if (std::any_of(known_.begin(), known_.end(), same)) return;
   const NearestKey nearest = nearest_key(entry.key, known_);
-  refusals_.add(entry.location, "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
+  rejections_.add(entry.location,
+                  "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
   std::erase_if(missing_, [&](const MissingKey& key) {
     return key.name == nearest.name || (!key.alternative.empty() && key.alternative == nearest.name);
   });

@@ -30,9 +30,9 @@ struct Range {
 /// expected and found value, and then leaves `out` at its default. Not RT-safe: allocates.
 class TomlValue {
  public:
-  TomlValue(RefusalList& refusals, const TomlNode* node, SourceLocation place, std::string name,
+  TomlValue(RejectionList& rejections, const TomlNode* node, SourceLocation place, std::string name,
             std::string unit)
-      : refusals_(&refusals),
+      : rejections_(&rejections),
         node_(node),
         location_(std::move(place)),
         name_(std::move(name)),
@@ -76,9 +76,9 @@ class TomlValue {
   std::string with_unit(double x) const;
 
   /// Rejects the value with "key 'NAME': MESSAGE", located at the value, or at the table if it is absent.
-  void refuse(const std::string& message) const;
+  void reject(const std::string& message) const;
   /// Rejects the value with "key 'NAME': expected EXPECTED, found ...". Returns false.
-  bool refuse_found(const std::string& expected) const;
+  bool reject_found(const std::string& expected) const;
 
  private:
   std::string range_text(Range range) const;
@@ -86,7 +86,7 @@ class TomlValue {
   std::optional<double> whole_number(Range range) const;
   bool choose(std::size_t& index, std::span<const std::string_view> words) const;
 
-  RefusalList* refusals_;
+  RejectionList* rejections_;
   const TomlNode* node_;
   SourceLocation location_;
   std::string name_;
@@ -102,8 +102,8 @@ class TomlTable {
   };
 
  public:
-  TomlTable(RefusalList& refusals, const TomlNode& node, std::string name)
-      : refusals_(refusals), node_(node), name_(std::move(name)) {}
+  TomlTable(RejectionList& rejections, const TomlNode& node, std::string name)
+      : rejections_(rejections), node_(node), name_(std::move(name)) {}
 
   /// The unit of the value is the ending of the key, unless `unit` is given.
   TomlValue optional(std::string_view key, std::string_view unit = {});
@@ -117,9 +117,9 @@ class TomlTable {
  private:
   std::string dotted(std::string_view key) const;
   const TomlEntry* find(std::string_view key) const;
-  void refuse_unknown(const TomlEntry& entry);
+  void reject_unknown(const TomlEntry& entry);
 
-  RefusalList& refusals_;
+  RejectionList& rejections_;
   const TomlNode& node_;
   std::string name_;
   std::vector<KnownKey> known_;
@@ -129,11 +129,11 @@ class TomlTable {
 /// Reads a root table of FILE through read(TomlTable&, args...). Throws one ConfigError with all defects.
 template <typename Read, typename... Args>
 void read_toml_node(const std::filesystem::path& file, const TomlNode& node, Read read, Args&&... args) {
-  RefusalList refusals(file);
-  TomlTable root(refusals, node, "");
+  RejectionList rejections(file);
+  TomlTable root(rejections, node, "");
   read(root, args...);
   root.close();
-  refusals.throw_if_any();
+  rejections.throw_if_any();
 }
 
 /// Reads FILE through read(TomlTable&, args...).
@@ -168,8 +168,8 @@ bool TomlValue::choice(E& out, std::initializer_list<std::pair<std::string_view,
 template <typename Read, typename... Args>
 void TomlValue::table(Read read, Args&&... args) const {
   if (!node_) return;
-  if (!is_table()) return void(refuse_found("a table"));
-  TomlTable table(*refusals_, *node_, name_);
+  if (!is_table()) return void(reject_found("a table"));
+  TomlTable table(*rejections_, *node_, name_);
   read(table, args...);
   table.close();
 }
@@ -178,7 +178,7 @@ template <typename Read, typename... Args>
 void TomlValue::table_or_empty(Read read, Args&&... args) const {
   if (node_) return table(read, args...);
   const TomlNode empty{location_, TomlNode::Table{}};
-  TomlValue(*refusals_, &empty, location_, name_, unit_).table(read, args...);
+  TomlValue(*rejections_, &empty, location_, name_, unit_).table(read, args...);
 }
 
 }  // namespace wrenchd

@@ -34,13 +34,9 @@ class VirtualClock final : public Clock {
   void sleep_until(TimePoint t) noexcept override {
     if (t > now_) now_ = t;
   }
-  Duration time_suspended() const noexcept override { return time_suspended_; }
-  /// Simulates a suspend of the machine for `d`, followed by a resume.
-  void suspend_for(Duration d) noexcept { time_suspended_ += d; }
 
  private:
   TimePoint now_{};
-  Duration time_suspended_{};
 };
 
 }  // namespace wrenchd

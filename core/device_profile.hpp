@@ -328,7 +328,7 @@ struct DeviceProfile {
   // Homing requirements before the device may be armed, and the moving masses of the handle.
   HomingPlan homing;
   /// true if homing.X_BR is stated; otherwise a device with joints uses its home position
-  bool has_rest_pose = false;
+  bool has_reference_pose = false;
   bool check_axes = false;  ///< each device needs one calibration in which all axes are moved
   MovingMasses masses;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -96,6 +97,10 @@ const FaultRow& fault_row(Fault fault) noexcept;
 using FaultSet = std::uint64_t;
 constexpr FaultSet bit(Fault fault) noexcept {
   return FaultSet{1} << static_cast<unsigned>(fault);
+}
+/// Returns the first fault of a set in the order of the enumeration. Precondition: the set is not empty.
+constexpr Fault first_fault(FaultSet faults) noexcept {
+  return static_cast<Fault>(std::countr_zero(faults));
 }
 
 }  // namespace wrenchd

@@ -28,12 +28,13 @@ struct HomingPlan {
   double max_rotation_rad = 3.2;  ///< largest valid rotation angle of R_BH; above pi: any rotation is valid
 
   ReferenceSchedule reference = ReferenceSchedule::never;
-  Pose X_BR;  ///< known rest pose of the handle
-  /// largest valid distance between rest pose and reported pose; beyond it homing rejects the reference
+  Pose X_BR;  ///< known reference pose of the handle
+  /// largest valid distance between reference pose and reported pose; beyond it homing rejects the reference
   double max_offset_m = 0.1;
-  /// largest valid angle between rest pose and reported pose; incremental encoders need a larger value
+  /// largest valid angle between reference pose and reported pose; incremental encoders need a larger value
   double max_offset_rad = 0.5;
-  std::uint32_t confirm_buttons = 0;  ///< any of these buttons confirms the rest pose; 0: only confirm() does
+  std::uint32_t confirm_buttons =
+      0;  ///< any of these buttons confirms the reference pose; 0: only confirm() does
 };
 
 }  // namespace wrenchd

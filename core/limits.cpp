@@ -117,16 +117,6 @@ const char* text(LimitCause cause) noexcept {
   return "unknown";
 }
 
-std::string limit_causes_text(std::uint16_t causes) {
-  std::string all;
-  for (unsigned bit = 0; bit < 16; ++bit) {
-    const auto cause = static_cast<std::uint16_t>(1u << bit);
-    if ((causes & cause) != 0)
-      all += (all.empty() ? "" : ", ") + std::string(text(static_cast<LimitCause>(cause)));
-  }
-  return all.empty() ? text(kNotLimited) : all;
-}
-
 WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile)
     : max_force_N_(tighter_of(settings.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N)),
       max_torque_Nm_(tighter_of(settings.max_torque_Nm, profile.max_torque_Nm, kAbsoluteMaxTorque_Nm)),

@@ -52,9 +52,6 @@ enum LimitCause : std::uint16_t {
 /// Name of one cause, for example "force magnitude". RT-safe.
 const char* text(LimitCause cause) noexcept;
 
-/// Names of all causes in a mask, for example "force magnitude, power"; "none" for 0. Not RT-safe: allocates.
-std::string limit_causes_text(std::uint16_t causes);
-
 /// Requested wrench and handle motion in a tick; in axes of the device base B, about the handle point H.
 struct LimitInput {
   Wrench requested;

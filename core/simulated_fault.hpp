@@ -25,7 +25,7 @@ struct SimulatedFault {
     short_report,     ///< reports arrive with half of their length
     long_report,      ///< reports arrive with one extra byte
     wrong_id,         ///< the first byte of each report is wrong
-    refuse_commands,  ///< the link accepts no commands
+    reject_commands,  ///< the link accepts no commands
     drop_commands,    ///< the link accepts commands and drops them
     stall,            ///< a read blocks until the fault ends
     // Content of the reports

@@ -18,7 +18,7 @@ namespace {
 /// rejected.
 constexpr double kRounding = 1e-9;
 
-[[noreturn]] void refuse(const std::string& what) {
+[[noreturn]] void reject(const std::string& what) {
   throw std::invalid_argument("stability bound: " + what);
 }
 
@@ -29,7 +29,7 @@ bool finite(const Matrix6d& K) noexcept {
 void check_damping(double b, DofMask driven, const char* key) {
   if (driven == kNoDof) return;
   if (!is_finite(b) || b < 0.0)
-    refuse(std::string("the device profile must state ") + key +
+    reject(std::string("the device profile must state ") + key +
            ", 0 or more; measure it with the motors off, or state 0 and nothing can be rendered");
 }
 
@@ -37,16 +37,16 @@ void check(const DeviceDamping& device, const LoopDelay& loop, const Coupling& c
            const EncoderStep& step) {
   check_damping(device.linear_N_s_per_m, driven & kLinearDofs, "damping_N_s_per_m");
   check_damping(device.angular_Nm_s_per_rad, driven & kAngularDofs, "damping_Nm_s_per_rad");
-  if (!is_finite(loop.period_s) || loop.period_s <= 0.0) refuse("the loop's period must be above 0 s");
-  if (!is_finite(loop.delay_s) || loop.delay_s < 0.0) refuse("the loop's delay must be 0 s or more");
+  if (!is_finite(loop.period_s) || loop.period_s <= 0.0) reject("the loop's period must be above 0 s");
+  if (!is_finite(loop.delay_s) || loop.delay_s < 0.0) reject("the loop's delay must be 0 s or more");
   for (const double s : {step.linear_m, step.angular_rad})
-    if (!is_finite(s) || s < 0.0) refuse("an encoder's step must be 0 or more");
+    if (!is_finite(s) || s < 0.0) reject("an encoder's step must be 0 or more");
   for (const auto& [name, K] :
        {std::pair{"stiffness", &coupling.stiffness}, {"damping", &coupling.damping}}) {
-    if (!finite(*K)) refuse(std::string("the ") + name + " has a number that is not finite");
+    if (!finite(*K)) reject(std::string("the ") + name + " has a number that is not finite");
     const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (*K + K->transpose()), Eigen::EigenvaluesOnly);
     if (eigen.eigenvalues()[0] < -kRounding * std::abs(eigen.eigenvalues()[5]))
-      refuse(std::string("the ") + name +
+      reject(std::string("the ") + name +
              " pushes apart in some direction; its symmetric part must have no " + "negative eigenvalue");
   }
 }

@@ -32,7 +32,7 @@ namespace {
 /// Time between two checks for a reload request.
 constexpr auto kReloadPeriod = std::chrono::milliseconds(100);
 
-/// Reads the configuration again and applies it. Tells the service manager and the event feed. Throws as
+/// Reads the configuration again and applies it. Notifies the service manager and the event feed. Throws as
 /// Reconfigurator::reload().
 ReloadResult reload_all(Runtime& runtime, EventFeed& feed, const RunContext& context) {
   struct Notification {

@@ -8,7 +8,7 @@ namespace wrenchd {
 
 /// Runs the daemon from the checked configuration to its end: link, runtime, recordings, control socket and
 /// servo loop. Returns the fault that ended the run, else Fault::none. Throws std::exception if a device, a
-/// file or the kernel refuses what the configuration needs. Not RT-safe: returns when the run is over.
+/// file or the kernel rejects what the configuration needs. Not RT-safe: returns when the run is over.
 Fault run_daemon(RunConfig config, const RunContext& context);
 
 }  // namespace wrenchd

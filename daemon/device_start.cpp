@@ -67,7 +67,7 @@ void log_missing_motors(const DeviceProfile& profile) {
 bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWaiting& waiting) {
   DeviceWait wait;
   const KnownProfiles known = known_profiles(SearchPath());
-  for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
+  for (const std::string& rejected : known.rejected) spdlog::warn("profile rejected: {}", rejected);
   bool reported = false;
   return wait.until(
       [&] {

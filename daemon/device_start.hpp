@@ -38,8 +38,8 @@ void log_missing_motors(const DeviceProfile& profile);
 std::string apply_calibration(Runtime& runtime, const UsbDevice& device, const CalibrationStore& store);
 
 /// If the encoders of the device count from the pose at power-up: waits until the operator has put the handle
-/// into its rest pose, and logs the instructions. Returns false if the device was lost or `stop` ended the
-/// waiting.
+/// into its reference pose, and logs the instructions. Returns false if the device was lost or `stop` ended
+/// the waiting.
 bool wait_for_rest_pose(Runtime& runtime, Clock& clock, const StopCondition& stop,
                         const ReportWaiting& waiting);
 

@@ -21,8 +21,8 @@ JournalFieldList journal_fields(const Event& event) {
     fields.emplace_back("WRENCHD_CURE", row.cure);
   } else {
     fields.emplace_back("MESSAGE_ID", kRenderingMessageId);
-    if (const auto* refused = std::get_if<Event::ArmingRefused>(&event.data))
-      fields.emplace_back("WRENCHD_STATE", name(refused->state));
+    if (const auto* rejected = std::get_if<Event::ArmingRejected>(&event.data))
+      fields.emplace_back("WRENCHD_STATE", name(rejected->state));
   }
   return fields;
 }

@@ -9,7 +9,7 @@ namespace wrenchd {
 /// Returns the fields of an event's journal entry, by which journalctl finds it:
 ///
 ///   MESSAGE_ID         one id for states, one for faults, one for all other events
-///   WRENCHD_STATE      the state that the loop entered, or in which it refused to arm
+///   WRENCHD_STATE      the state that the loop entered, or in which a request to arm was rejected
 ///   WRENCHD_FAULT      name of the fault
 ///   WRENCHD_CURE       what to do about the fault
 ///   WRENCHD_TIME_NS    monotonic time at which the servo thread emitted the event [ns]

@@ -36,8 +36,8 @@ double angle(const std::array<double, 7>& X) {
 
 std::string state(const TickRecord& r) {
   const auto state = static_cast<State>(r.state);
-  if (r.state_cause != 0 && (is_latched(state) || state == State::degraded))
-    return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.state_cause)).name);
+  if (r.state_cause != Fault::none && (is_latched(state) || state == State::degraded))
+    return fmt::format("{}:{}", name(state), fault_row(r.state_cause).name);
   if (const auto initialization = static_cast<ProxyInitialization>(r.proxy_initialization);
       initialization != ProxyInitialization::complete)
     return name(initialization);
@@ -47,7 +47,7 @@ std::string state(const TickRecord& r) {
 /// fx fy fz [N], tx ty tz [N.m].
 std::array<double, 6> wrench(const TickRecord& r, ShownWrench shown) {
   if (shown == ShownWrench::sent) return r.F_out;
-  const Quaterniond R_WP(r.X_WP[6], r.X_WP[3], r.X_WP[4], r.X_WP[5]);
+  const Quaterniond R_WP = pose_from_numbers(r.X_WP).rotation;
   const Vector3d f = R_WP * Vector3d(r.F_T[0], r.F_T[1], r.F_T[2]);
   const Vector3d t = R_WP * Vector3d(r.F_T[3], r.F_T[4], r.F_T[5]);
   return {f.x(), f.y(), f.z(), t.x(), t.y(), t.z()};

@@ -17,8 +17,9 @@
 
 namespace {
 
-constexpr int kExitRefused = 1;  ///< a file, a device or the kernel refused; the loop did not start
-constexpr int kExitFault = 3;    ///< the run ended with a fault that no client acknowledged
+constexpr int kExitRejected =
+    1;  ///< a file, a device or the kernel rejected the configuration; the loop did not start
+constexpr int kExitFault = 3;  ///< the run ended with a fault that no client acknowledged
 
 void set_up_log(bool verbose) {
   if (wrenchd::stderr_is_journal()) {
@@ -46,7 +47,7 @@ int main(int argc, char** argv) {
     return fault == wrenchd::Fault::none ? 0 : kExitFault;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "wrenchd: %s\n", error.what());
-    service.stopping(std::string("refused: ") + error.what());
-    return kExitRefused;
+    service.stopping(std::string("rejected: ") + error.what());
+    return kExitRejected;
   }
 }

@@ -15,7 +15,7 @@ namespace {
 
 void add_file_options(CLI::App& app, Options& options) {
   app.add_option("-c,--config", options.files.config,
-                 "wrenchd.toml; wrenchd looks for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
+                 "wrenchd.toml; wrenchd searches for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
                  "source tree")
       ->capture_default_str()
       ->check(not_empty());
@@ -122,7 +122,7 @@ void add_options(CLI::App& app, Options& options) {
       "Signals: SIGHUP reads the configuration again and applies all of it, or nothing if it has an error;\n"
       "SIGUSR1 is an emergency stop; SIGUSR2 acknowledges a stop or a fault. After both the loop is "
       "disarmed.\n"
-      "Exit codes: 0 stopped on request; 1 refused (file, device, kernel); 3 ended with a fault that no\n"
+      "Exit codes: 0 stopped on request; 1 rejected (file, device, kernel); 3 ended with a fault that no\n"
       "client acknowledged; others: usage. Every exit releases the hand: zero wrench, motors off.");
   app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
   add_file_options(app, options);

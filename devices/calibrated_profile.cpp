@@ -17,7 +17,7 @@ std::string joint_name(std::size_t joint) {
   return "joint_" + std::to_string(joint + 1);
 }
 
-[[noreturn]] void refuse(const DeviceProfile& profile, const std::string& axis) {
+[[noreturn]] void reject(const DeviceProfile& profile, const std::string& axis) {
   throw std::invalid_argument("the calibration names the axis " + axis + ", which the profile " +
                               profile.name + " does not have; calibrate again");
 }
@@ -29,12 +29,12 @@ void shift_joint(DeviceProfile& profile, const AxisOffset& offset) {
     k.zero_rad[i] -= offset.offset;
     return;
   }
-  refuse(profile, offset.axis);
+  reject(profile, offset.axis);
 }
 
 JointAngles angles_in_rest(const DeviceProfile& profile) {
   const Kinematics& k = profile.kinematics;
-  if (!profile.has_rest_pose) return joint_angles(k, k.home_counts);
+  if (!profile.has_reference_pose) return joint_angles(k, k.home_counts);
   const auto angles = inverse(k, inverse(profile.X_BD) * profile.homing.X_BR * inverse(profile.X_EH));
   if (angles) return *angles;
   throw std::invalid_argument(
@@ -53,7 +53,7 @@ DeviceProfile apply_calibration(DeviceProfile profile, const std::vector<AxisOff
   const auto offset = pose_offset(offsets);
   if (!offset) {
     for (const AxisOffset& one : offsets)
-      if (!pose_offset({one})) refuse(profile, one.axis);
+      if (!pose_offset({one})) reject(profile, one.axis);
   }
   profile.X_BD.translation_m -= offset->position_m;
   profile.X_EH.rotation = (profile.X_EH.rotation * rotation_from(-offset->rotation_rad)).normalized();
@@ -74,7 +74,7 @@ HomingPlan homing_plan(const DeviceProfile& profile) {
   HomingPlan plan = profile.homing;
   const DofMask sensed = sensed_dofs(profile);
   for (unsigned i = 0; i < 6; ++i) plan.sensed[i] = (sensed >> i & 1u) != 0;
-  if (!has_joints(profile) || profile.has_rest_pose) return plan;
+  if (!has_joints(profile) || profile.has_reference_pose) return plan;
   if (const auto X_DE = home_pose(profile.kinematics)) plan.X_BR = profile.X_BD * *X_DE * profile.X_EH;
   return plan;
 }

@@ -89,7 +89,6 @@ class Homing {
   const HomingState& advance(const DeviceSample& sample, TimePoint now) noexcept;
 
   const HomingState& state() const noexcept { return state_; }
-  bool may_arm() const noexcept { return state_.step == HomingStep::done; }
   /// Offset of the pose; valid after the reference pose was measured. RT-safe.
   const PoseOffset& offset() const noexcept { return offset_; }
 

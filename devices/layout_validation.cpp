@@ -21,20 +21,20 @@ class FieldMap {
     const std::size_t tail_bytes = frame.checksum_at ? 0 : checksum_bytes(frame.checksum);
     const std::size_t min_length = std::max<std::size_t>((frame.has_id ? 1 : 0) + tail_bytes, 1);
     if (frame.length < min_length || frame.length > kMaxReportBytes)
-      refuse("length = " + std::to_string(frame.length) + " must be " + std::to_string(min_length) + " to " +
+      reject("length = " + std::to_string(frame.length) + " must be " + std::to_string(min_length) + " to " +
              std::to_string(kMaxReportBytes) + " bytes");
     if (frame.min_length > frame.length || (frame.min_length != 0 && frame.checksum != Checksum::none))
-      refuse("min_length = " + std::to_string(frame.min_length) +
+      reject("min_length = " + std::to_string(frame.min_length) +
              " must not exceed length, and must not be stated together with a checksum");
-    if (frame.min_length == 0 && frame.length < min_length) refuse("is empty");
+    if (frame.min_length == 0 && frame.length < min_length) reject("is empty");
     field_bits_ = 8 * (frame.length - tail_bytes);
     if (frame.has_id) claim("the report id", 0, 8);
     if (frame.checksum_at) {
-      if (*frame.checksum_at >= kMaxReportBytes) refuse("the checksum does not fit");
+      if (*frame.checksum_at >= kMaxReportBytes) reject("the checksum does not fit");
       claim("the checksum", 8 * *frame.checksum_at, 8 * checksum_bytes(frame.checksum));
     }
     if (frame.checksum != Checksum::none && frame.checksum_from >= checksum_offset(frame))
-      refuse("the checksum covers nothing: checksum_from = " + std::to_string(frame.checksum_from) +
+      reject("the checksum covers nothing: checksum_from = " + std::to_string(frame.checksum_from) +
              " must be before it");
     for (const ReportConstant& constant : frame.constants) claim_byte("a constant byte", constant.byte);
   }
@@ -43,26 +43,26 @@ class FieldMap {
     if (!field.present) return;
     const std::string field_name = name;
     if (field.bits < 1 || field.bits > 64)
-      refuse(field_name + " must be 1 to 64 bits wide, not " + std::to_string(field.bits));
-    if (field.bit > 7) refuse(field_name + " must start at one of the bits 0 to 7 of its byte");
+      reject(field_name + " must be 1 to 64 bits wide, not " + std::to_string(field.bits));
+    if (field.bit > 7) reject(field_name + " must start at one of the bits 0 to 7 of its byte");
     if (field.coding == Coding::nibble_ascii && (field.bits % kBitsPerNibble != 0 || field.bit != 0))
-      refuse(field_name +
+      reject(field_name +
              " is coded as nibbles, so its width must be a multiple of 4 and it starts at bit 0");
     if (field.big_endian && field.coding == Coding::binary && (field.bits % 8 != 0 || field.bit != 0))
-      refuse(field_name + " is big-endian, so it must be made of whole bytes");
-    if (!is_finite(field.step) || field.step == 0.0) refuse(field_name + " needs a finite step other than 0");
-    if (!is_finite(field.offset)) refuse(field_name + " needs a finite offset");
+      reject(field_name + " is big-endian, so it must be made of whole bytes");
+    if (!is_finite(field.step) || field.step == 0.0) reject(field_name + " needs a finite step other than 0");
+    if (!is_finite(field.offset)) reject(field_name + " needs a finite offset");
     if (field.count != count)
-      refuse(field_name + " must hold " + std::to_string(count) + " integers, not " +
+      reject(field_name + " must hold " + std::to_string(count) + " integers, not " +
              std::to_string(field.count));
-    if (field.byte >= kMaxReportBytes) refuse_position(name, field.byte);
+    if (field.byte >= kMaxReportBytes) reject_position(name, field.byte);
     claim(name, 8 * field.byte + field.bit, integer_stride(field) * count);
   }
 
   void claim(const char* name, const ReportBit& field) {
     if (!field.present) return;
-    if (field.bit > 7) refuse(std::string(name) + " must be one of the bits 0 to 7 of its byte");
-    if (field.byte >= kMaxReportBytes) refuse_position(name, field.byte);
+    if (field.bit > 7) reject(std::string(name) + " must be one of the bits 0 to 7 of its byte");
+    if (field.byte >= kMaxReportBytes) reject_position(name, field.byte);
     claim(name, 8 * field.byte + field.bit, 1);
   }
 
@@ -71,29 +71,29 @@ class FieldMap {
   }
 
   void require(const char* name, const ReportField& field) const {
-    if (!field.present) refuse(std::string(name) + " is missing; a device without it cannot be used");
+    if (!field.present) reject(std::string(name) + " is missing; a device without it cannot be used");
   }
 
-  [[noreturn]] void refuse(const std::string& why) const {
+  [[noreturn]] void reject(const std::string& why) const {
     throw std::invalid_argument(report_ + ": " + why);
   }
 
  private:
   void claim_byte(const char* name, std::size_t byte) {
-    if (byte >= kMaxReportBytes) refuse_position(name, byte);
+    if (byte >= kMaxReportBytes) reject_position(name, byte);
     claim(name, 8 * byte, 8);
   }
 
-  [[noreturn]] void refuse_position(const char* name, std::size_t byte) const {
-    refuse(std::string(name) + " at byte " + std::to_string(byte) + " does not fit: the fields end at byte " +
+  [[noreturn]] void reject_position(const char* name, std::size_t byte) const {
+    reject(std::string(name) + " at byte " + std::to_string(byte) + " does not fit: the fields end at byte " +
            std::to_string(field_bits_ / 8) + ", before the checksum if there is one");
   }
 
   void claim(const char* name, std::size_t first, std::size_t bits) {
-    if (first >= field_bits_ || bits > field_bits_ - first) refuse_position(name, first / 8);
+    if (first >= field_bits_ || bits > field_bits_ - first) reject_position(name, first / 8);
     for (std::size_t i = first; i < first + bits; ++i) {
       if (owner_[i] != nullptr)
-        refuse(std::string(name) + " overlaps " + owner_[i] + " at byte " + std::to_string(i / 8));
+        reject(std::string(name) + " overlaps " + owner_[i] + " at byte " + std::to_string(i / 8));
       owner_[i] = name;
     }
   }
@@ -127,7 +127,7 @@ FieldMap map_fields(const PoseReportLayout& layout) {
   map.claim("a bit of homed", layout.homed);
   for (const NamedBit& status : layout.status) map.claim("a status bit", status.bit);
   for (const NamedField& named : layout.values) map.claim("a value", named.field, 1);
-  if (layout.button_bits.size() > 32) map.refuse("has more than 32 buttons");
+  if (layout.button_bits.size() > 32) map.reject("has more than 32 buttons");
   return map;
 }
 
@@ -147,24 +147,24 @@ void validate_pose(const DeviceProfile& profile, const std::vector<const PoseRep
   const auto any = [&](ReportField PoseReportLayout::*field) {
     return std::any_of(layouts.begin(), layouts.end(), [&](const auto* l) { return (l->*field).present; });
   };
-  const auto refuse = [](const char* why) { throw std::invalid_argument(why); };
+  const auto reject = [](const char* why) { throw std::invalid_argument(why); };
   const bool joints = any(&PoseReportLayout::joints);
   const bool deflection = any(&PoseReportLayout::translation) || any(&PoseReportLayout::rotation);
   switch (pose_source(profile)) {
     case PoseSource::joints:
-      if (!joints) refuse("kinematics is stated, but no report carries joints");
+      if (!joints) reject("kinematics is stated, but no report carries joints");
       for (const auto* l : layouts)
         if (l->joints.present && l->joints.count < profile.kinematics.joints)
-          refuse("joints holds fewer integers than kinematics has joints");
+          reject("joints holds fewer integers than kinematics has joints");
       return;
     case PoseSource::deflection:
-      if (!deflection) refuse("deflection is stated, but no report carries a translation or a rotation");
+      if (!deflection) reject("deflection is stated, but no report carries a translation or a rotation");
       return;
     case PoseSource::pose:
-      if (joints) refuse("a report carries joints, but kinematics is not stated");
-      if (deflection) refuse("a report carries a translation or rotation, but deflection is not stated");
+      if (joints) reject("a report carries joints, but kinematics is not stated");
+      if (deflection) reject("a report carries a translation or rotation, but deflection is not stated");
       if (!any(&PoseReportLayout::position))
-        refuse("position is missing; a device without it cannot be used");
+        reject("position is missing; a device without it cannot be used");
       return;
   }
 }
@@ -179,11 +179,11 @@ void validate(const PoseReportLayout& layout) {
 void validate(const WrenchReportLayout& layout) {
   FieldMap map("wrench_report", layout);
   if (!layout.template_bytes.empty() && layout.template_bytes.size() != layout.length)
-    map.refuse("template has " + std::to_string(layout.template_bytes.size()) +
+    map.reject("template has " + std::to_string(layout.template_bytes.size()) +
                " bytes and must have the length of the report, " + std::to_string(layout.length));
   if (!layout.efforts.present) map.require("force", layout.force);
   if (layout.efforts.present && (layout.force.present || layout.torque.present))
-    map.refuse("efforts replace force and torque; leave one of the two out");
+    map.reject("efforts replace force and torque; leave one of the two out");
   map.claim("enable", layout.enable);
   map.claim("sequence", layout.sequence, 1);
   map.claim("force", layout.force, 3);

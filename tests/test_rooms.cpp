@@ -68,7 +68,7 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
   }
 }
 
-TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") {
+TEST_CASE("headers do not include CGAL, hidapi, toml++ or HDF5", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude)
     for (const Include& include : includes_of(room)) {
       if (include.file.extension() != ".hpp") continue;
@@ -78,8 +78,7 @@ TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") 
     }
 }
 
-TEST_CASE("what runs on the servo thread includes nothing that allocates, locks or writes by itself",
-          "[rooms]") {
+TEST_CASE("code of the servo thread includes no header that allocates, locks or writes", "[rooms]") {
   const std::vector<std::string> forbidden = {
       "nlohmann/",          "spdlog/", "fmt/",    "filesystem", "hdf5",    "H5",
       "iostream",           "fstream", "sstream", "ostream",    "istream", "mutex",

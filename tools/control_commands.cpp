@@ -154,7 +154,7 @@ void run_watch(const ControlOptions& options) {
 int run_arm(const ControlOptions& options) {
   catch_signals();
   Client client(options.socket, kResponseTimeout);
-  call(client, "subscribe", {{"events", {"state", "fault", "arming_refused", "lease", "events_lost"}}});
+  call(client, "subscribe", {{"events", {"state", "fault", "arming_rejected", "lease", "events_lost"}}});
   call(client, "lease.acquire", options.preempt ? Json{{"preempt", true}} : Json::object());
   call(client, "arm");
   std::string state = "waiting";
@@ -165,7 +165,7 @@ int run_arm(const ControlOptions& options) {
     show(*event, options);
     const auto name = (*event)["name"].get<std::string>();
     if (name == "state") state = (*event)["state"];
-    if (name == "arming_refused" || !is_armed(state)) {
+    if (name == "arming_rejected" || !is_armed(state)) {
       wait_for_release(client, options, state);
       std::fputs("wrenchctl: the daemon has disarmed; wrenchctl status shows the cause\n", stderr);
       return 1;

@@ -52,7 +52,7 @@ Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profil
   Entry entry{to_printable(device), inspect_device(device), {}, false};
   entry.match = match_profile(entry.facts.identity, profiles);
   const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
-  entry.related = entry.match.profile || !entry.match.refusal.empty() || multi_axis ||
+  entry.related = entry.match.profile || !entry.match.rejection.empty() || multi_axis ||
                   std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
                     return claims(profile, entry.facts.identity.id);
                   });
@@ -218,14 +218,14 @@ std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& prof
            (others.empty() ? "" : "  the other profiles:\n" + others);
   }
   if (find_unusable_device(entry.facts.identity.id) != nullptr)
-    return begin + indented(entry.match.refusal) +
+    return begin + indented(entry.match.rejection) +
            indented("wrenchd does not open this device, independent of profiles");
   std::string text = begin + access(device, why_not_open);
   if (!entry.facts.descriptor_error.empty())
     text += indented("the report descriptor is invalid: " + entry.facts.descriptor_error);
-  text += indented(entry.match.refusal.empty() ? "no profile matches:" : entry.match.refusal);
+  text += indented(entry.match.rejection.empty() ? "no profile matches:" : entry.match.rejection);
   text += why_not(entry, profiles);
-  if (entry.match.refusal.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
+  if (entry.match.rejection.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
     text += indented("wrenchctl profile --from " + device.hidraw_node + " proposes one");
   return text;
 }
@@ -257,9 +257,9 @@ std::string equal_devices(const std::vector<Entry>& entries, const std::vector<D
 std::string about_profiles(const KnownProfiles& known) {
   std::string text;
   if (known.profiles.empty()) text += "There are no profiles.\n";
-  if (known.refused.empty()) return text;
+  if (known.rejected.empty()) return text;
   text += "Invalid profiles, which were ignored:\n";
-  for (const std::string& why : known.refused) text += indented(why);
+  for (const std::string& why : known.rejected) text += indented(why);
   return text;
 }
 

@@ -10,7 +10,7 @@ set style line 4 linewidth 2.5 linecolor rgb '#222222'
 set style line 5 linewidth 2 linecolor rgb '#222222' pointtype 2 pointsize 2
 set key top right box linecolor rgb '#dddddd' opaque
 
-# Figs. 11 and 12: the cube at every tenth step, the first in bold, and the way of its centre of mass.
+# Figs. 11 and 12: the cube at every tenth step, the first in bold, and the path of its centre of mass.
 set size ratio -1
 set xlabel 'x [cm]'
 set ylabel 'y [cm]'

@@ -205,8 +205,8 @@ constexpr Half kTranslation = {"translation", "step_m", "offset_m", "linear_gain
 constexpr Half kRotation = {"rotation", "step_rad", "offset_rad", "angular_gain", "angle",
                             "0.1 rad",  0.1,        1.0,          "1 rad/s",      3};
 
-/// Returns the count of the undeflected cap: 0, or the middle if 0 is outside its range.
-double rest_count(const DescribedNumber& axis) {
+/// Returns the count of the undeflected puck: 0, or the middle if 0 is outside its range.
+double centre_count(const DescribedNumber& axis) {
   if (axis.logical_min < 0 && axis.logical_max > 0) return 0.0;
   return std::ceil(0.5 * (static_cast<double>(axis.logical_min) + static_cast<double>(axis.logical_max)));
 }
@@ -216,7 +216,7 @@ double counts_to_end(const SixAxisController& device, const Half& half) {
   double most = 0.0;
   for (std::size_t i = half.first; i < half.first + 3; ++i) {
     const DescribedNumber& axis = device.axes[i];
-    const double rest = rest_count(axis);
+    const double rest = centre_count(axis);
     most = std::max(
         {most, static_cast<double>(axis.logical_max) - rest, rest - static_cast<double>(axis.logical_min)});
   }
@@ -231,7 +231,7 @@ bool is_field(const SixAxisController& device, const Half& half) {
     const DescribedNumber& b = device.axes[half.first + i];
     const bool same_step = a.step == b.step || (!std::isfinite(a.step) && !std::isfinite(b.step));
     if (b.bit != a.bit + i * a.bits || b.bits != a.bits || b.is_signed() != a.is_signed() || !same_step ||
-        rest_count(a) != rest_count(b))
+        centre_count(a) != centre_count(b))
       return false;
   }
   return counts_to_end(device, half) > 0.0;
@@ -246,7 +246,7 @@ struct Step {
 
 Step step_of(const SixAxisController& device, const Half& half) {
   const double own = device.axes[half.first].step;
-  const double offset = std::abs(rest_count(device.axes[half.first]) * own);
+  const double offset = std::abs(centre_count(device.axes[half.first]) * own);
   if (own >= kLeastStep && own <= kLargestStep && offset <= kLargestOffset) return {own, false};
   return {half.full / counts_to_end(device, half), true};
 }
@@ -286,7 +286,7 @@ std::string axes_field(const SixAxisController& device, const Half& half) {
     return std::string("# FILL IN: ") + half.key + ". " + axes_places(device, half.first) +
            ":\n#   not three equal, adjacent numbers with a common step, as a field requires\n";
   const Step step = step_of(device, half);
-  const double rest = rest_count(axis);
+  const double rest = centre_count(axis);
   std::string text = "# " + axes_places(device, half.first) + ".\n";
   if (step.guessed)
     text += std::string("# GUESSED: the step. The descriptor gives no ") + half.step_description +

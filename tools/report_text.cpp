@@ -226,7 +226,7 @@ std::vector<std::uint8_t> home_report(const DeviceProfile& profile) {
   return bytes;
 }
 
-[[noreturn]] void refuse_place(const DeviceProfile& profile, Bytes at) {
+[[noreturn]] void reject_place(const DeviceProfile& profile, Bytes at) {
   std::string reasons = "it is a report to the device, not from it";
   try {
     report_text(profile, at);
@@ -292,7 +292,7 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
     const Bytes given = without_wrapping(profile, at);
     link.waiting = at.empty() ? home_report(profile) : std::vector<std::uint8_t>(given.begin(), given.end());
     const DeviceSample sample = device.read_newest(now += std::chrono::milliseconds(1));
-    if (sample.rejected > 0) refuse_place(profile, at);
+    if (sample.rejected > 0) reject_place(profile, at);
     if (!sample.homed)
       encoded.remarks.push_back("the encoders in --at are not homed: the motors stay off");
     else if (sample.fault != Fault::none)

@@ -19,7 +19,7 @@ class Runtime;
 /// methods before open(). Not RT-safe: allocates.
 class ControlInterface {
  public:
-  /// Station and feed must outlive this.
+  /// The runtime and the feed must outlive this object.
   ControlInterface(Runtime& runtime, EventFeed& feed);
 
   /// Method table. Add rows before open().

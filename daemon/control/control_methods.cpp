@@ -8,6 +8,7 @@
 
 #include "config/config_error.hpp"
 #include "config/nearest_key.hpp"
+#include "config/setting_table.hpp"
 #include "daemon/version.hpp"
 
 namespace wrenchd {
@@ -15,6 +16,33 @@ namespace {
 
 /// Version of the protocol. Increase it with each change that breaks a client of the previous version.
 constexpr int kProtocol = 2;
+
+/// Returns what a reload does with a changed setting.
+const char* on_reload_text(Setting::Effect effect) noexcept {
+  switch (effect) {
+    case Setting::Effect::new_rendering:
+      return "crossfades to a new rendering";
+    case Setting::Effect::immediate:
+      return "applies at once";
+    case Setting::Effect::limits:
+      return "applies at once if tighter; if looser, only while the loop is disarmed";
+    case Setting::Effect::restart:
+      return "requires a restart";
+    case Setting::Effect::scene:
+      return "loads the scene if its files have changed";
+    case Setting::Effect::none:
+      return "has no effect";
+  }
+  return "";
+}
+
+Json settings_description() {
+  Json settings = Json::array();
+  for (const Setting& setting : setting_table())
+    if (setting.read != nullptr)
+      settings.push_back({{"name", setting.name()}, {"on_reload", on_reload_text(setting.effect)}});
+  return settings;
+}
 
 bool is_vector(const Json& value) {
   return value.is_array() && value.size() == 3 &&
@@ -171,6 +199,7 @@ Json MethodTable::describe() const {
           {"roles", roles},
           {"methods", methods},
           {"events", events},
+          {"settings", settings_description()},
           {"errors",
            {error(RpcCode::parse_error, "The line is not valid JSON."),
             error(RpcCode::invalid_request, "The line is valid JSON, but no request."),

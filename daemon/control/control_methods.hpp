@@ -96,7 +96,8 @@ class MethodTable {
   /// Runs the method. Turns every exception into RpcError.
   static MethodResult run(const MethodRow& row, const Json& params, const Caller& caller);
 
-  /// {version, protocol, roles, methods, events, errors, limits}
+  /// {version, protocol, roles, methods, events, settings, errors, limits}. settings: one entry for each key
+  /// of wrenchd.toml in setting_table().
   Json describe() const;
 
  private:

@@ -284,8 +284,8 @@ void ControlSocket::process_lines(Client& client) {
 
 void ControlSocket::process_line(Client& client, std::string_view line) {
   const auto read = parse_request(line);
-  if (const auto* refused = std::get_if<InvalidRequest>(&read))
-    return queue_line(client, error_line(refused->id, refused->error));
+  if (const auto* rejected = std::get_if<InvalidRequest>(&read))
+    return queue_line(client, error_line(rejected->id, rejected->error));
   const auto& request = std::get<RpcRequest>(read);
   Caller caller{client.number, client.role, client.peer.description(), &client.subscription};
   try {

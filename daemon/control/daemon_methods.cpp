@@ -156,7 +156,7 @@ MethodResult list_devices() {
          {"profile", selected ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
          {"rejection_reason", choice.rejections[i]}});
   }
-  return Json{{"devices", list}, {"invalid_profiles", known.refused}};
+  return Json{{"devices", list}, {"invalid_profiles", known.rejected}};
 }
 
 void add_status_methods(MethodTable& table, const DaemonContext& context) {
@@ -164,7 +164,7 @@ void add_status_methods(MethodTable& table, const DaemonContext& context) {
                       Role::observer,
                       {},
                       "Returns version and protocol, each method with its role and parameters, each event, "
-                      "and each error.",
+                      "each setting with the effect of its reload, and each error.",
                       [&table](const Json&, const Caller&) { return MethodResult(table.describe()); }});
   table.add(
       MethodRow{"status",
@@ -248,17 +248,17 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
                 Role::operator_,
                 {},
                 "Requests force; only the holder of the lease may. The force rises when the hand is calm. "
-                "Event 'state' or 'arming_refused' reports the result.",
+                "Event 'state' or 'arming_rejected' reports the result.",
                 [context](const Json&, const Caller& caller) { return arm(context, caller); }});
-  table.add(
-      MethodRow{"disarm",
-                Role::operator_,
-                {},
-                "The force fades out within 100 ms, whichever client armed. The lease keeps its holder.",
-                [context](const Json&, const Caller&) {
-                  context.runtime.loop().requests().disarm();
-                  return MethodResult(Json{{"requested", "disarm"}});
-                }});
+  table.add(MethodRow{
+      "disarm",
+      Role::operator_,
+      {},
+      "The force fades out within 100 ms, no matter which client armed. The lease keeps its holder.",
+      [context](const Json&, const Caller&) {
+        context.runtime.loop().requests().disarm();
+        return MethodResult(Json{{"requested", "disarm"}});
+      }});
   table.add(MethodRow{"acknowledge",
                       Role::operator_,
                       {},

@@ -56,8 +56,8 @@ EventDescription describe_event(const Event::StabilityBoundUnknown&) {
           {{"scale", nullptr}}};
 }
 
-EventDescription describe_event(const Event::ArmingRefused& e) {
-  return {"arming_refused",
+EventDescription describe_event(const Event::ArmingRejected& e) {
+  return {"arming_rejected",
           EventLevel::warning,
           fmt::format("not armed: {}", transition(Trigger::arm, e.state).reason),
           {{"state", name(e.state)}}};

@@ -33,7 +33,7 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
   if (const auto* state = std::get_if<Event::StateChanged>(&event.data)) {
     snapshot.state = state->state;
     snapshot.cause = state->cause;
-    if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it anew
+    if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it again
   }
   if (const auto* stiffness = std::get_if<Event::StiffnessScaled>(&event.data))
     snapshot.stiffness_scale = stiffness->scale;
@@ -58,7 +58,7 @@ std::span<const EventRow> feed_events() {
        "The self-test has derived the stiffness that stays passive. scale: share of the configured "
        "stiffness; null: the "
        "profile states no damping, so the stability bound is unknown."},
-      {"arming_refused", "A request to arm was refused. state: the state that does not allow it."},
+      {"arming_rejected", "A request to arm was rejected. state: the state that does not allow it."},
       {"proxy_initialization",
        "The search for a feasible pose of the tool, after each arming. outcome: searching, found "
        "(distance_m: from the "
@@ -69,7 +69,7 @@ std::span<const EventRow> feed_events() {
        "crossfade_complete: "
        "false when the crossfade begins, true when it ends."},
       {"reload",
-       "The configuration was reloaded. applied, not_applied: keys; error: why it was refused, or null."},
+       "The configuration was reloaded. applied, not_applied: keys; error: why it was rejected, or null."},
       {"log", "Any other log line."},
   }};
   return rows;

@@ -21,7 +21,7 @@ namespace wrenchd {
 
 class ServoLoop;
 
-/// A kind of event, as `describe` tells it.
+/// A kind of event, as listed by `describe`.
 struct EventRow {
   std::string name;
   std::string doc;  ///< when the event is emitted, and its fields

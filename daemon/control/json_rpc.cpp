@@ -27,9 +27,9 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   bool number_float(number_float_t, const string_t&) override { return true; }
   bool string(string_t& text) override {
     if (text.find('\0') == string_t::npos) return true;
-    return refuse("a text contains the character zero");
+    return reject("a text contains the character zero");
   }
-  bool binary(binary_t&) override { return refuse("it is binary"); }
+  bool binary(binary_t&) override { return reject("it is binary"); }
   bool start_object(std::size_t) override { return enter(); }
   bool start_array(std::size_t) override { return enter(); }
   bool end_object() override { return leave(); }
@@ -37,22 +37,22 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   bool key(string_t& name) override {
     if (!string(name)) return false;
     if (names_.back().insert(name).second) return true;
-    return refuse("the name '" + printable(name) + "' occurs twice in one object; remove one");
+    return reject("the name '" + printable(name) + "' occurs twice in one object; remove one");
   }
   bool parse_error(std::size_t position, const std::string& token, const Json::exception&) override {
-    return refuse("at byte " + std::to_string(position) + ", after '" + printable(token) +
+    return reject("at byte " + std::to_string(position) + ", after '" + printable(token) +
                   "', it is not JSON");
   }
 
  private:
-  bool refuse(std::string what) {
+  bool reject(std::string what) {
     wrong_ = std::move(what);
     return false;
   }
   bool enter() {
     names_.emplace_back();
     return names_.size() <= kMaxDepth ||
-           refuse("objects and arrays are nested deeper than " + std::to_string(kMaxDepth));
+           reject("objects and arrays are nested deeper than " + std::to_string(kMaxDepth));
   }
   bool leave() {
     names_.pop_back();

@@ -29,8 +29,8 @@ class Lease {
   /// Gives the lease to the client. Counts as a heartbeat. Precondition: the lease is free, or this client
   /// holds it.
   void acquire(const Holder& client, TimePoint now);
-  /// Gives the lease to the client, whichever client holds it. Disarms the loop if the previous holder armed
-  /// it.
+  /// Gives the lease to the client, even if another client holds it. Disarms the loop if the previous holder
+  /// armed it.
   void preempt(const Holder& client, TimePoint now);
   /// Frees the lease, and disarms the loop if the holder armed it. reason: ends the log line "lease:
   /// <holder>".

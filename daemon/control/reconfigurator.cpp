@@ -40,7 +40,7 @@ std::string names(const SceneSettings& scene) {
   return all.empty() ? "none" : all;
 }
 
-[[noreturn]] void refuse_unknown(const std::string& name, const SceneSettings& scene) {
+[[noreturn]] void reject_unknown(const std::string& name, const SceneSettings& scene) {
   throw std::invalid_argument("there is no obstacle '" + name + "' in the scene; there are: " + names(scene));
 }
 
@@ -74,6 +74,32 @@ std::vector<std::string> names_of(const Scene& scene) {
   return names;
 }
 
+/// Returns a text that changes if a file of the scene changes.
+std::string files_fingerprint(const SceneSettings& scene) {
+  std::string text = scene.file.string() + '\n' + contents(scene.file);
+  const auto add = [&text](const std::filesystem::path& mesh) {
+    std::error_code error;
+    text += '\n' + mesh.string() + ' ' + std::to_string(std::filesystem::file_size(mesh, error)) + ' ' +
+            std::to_string(std::filesystem::last_write_time(mesh, error).time_since_epoch().count());
+  };
+  add(scene.tool.mesh);
+  for (const MeshObstacleSettings& obstacle : scene.meshes) add(obstacle.mesh);
+  return text;
+}
+
+/// Returns why the loop cannot apply a changed setting now; empty if it can. wanted: present settings with
+/// the new value of this setting.
+std::string reason_not_to_apply(const Setting& setting, const Settings& present, const Settings& wanted,
+                                const DeviceProfile& profile, bool armed) {
+  if (setting.effect == Setting::Effect::restart) return "requires a restart";
+  if (setting.effect != Setting::Effect::limits || !armed) return {};
+  Settings allowed = wanted;
+  allowed.limits = tighter(present.limits, wanted.limits, profile);
+  if (setting.equal(allowed, wanted)) return {};
+  return "is looser than " + to_text(setting.number(present)) +
+         ", which holds as long as the loop is armed; disarm, and reload again";
+}
+
 }  // namespace
 
 Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
@@ -88,33 +114,29 @@ Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> sc
       loader_(std::move(loader)),
       names_{0, names_of(*scene_)} {}
 
-/// Returns a text that changes if a file of the scene changes.
-std::string Reconfigurator::files_fingerprint(const SceneSettings& scene) const {
-  std::string text = scene.file.string() + '\n' + contents(scene.file);
-  const auto add = [&text](const std::filesystem::path& mesh) {
-    std::error_code error;
-    text += '\n' + mesh.string() + ' ' + std::to_string(std::filesystem::file_size(mesh, error)) + ' ' +
-            std::to_string(std::filesystem::last_write_time(mesh, error).time_since_epoch().count());
-  };
-  add(scene.tool.mesh);
-  for (const MeshObstacleSettings& obstacle : scene.meshes) add(obstacle.mesh);
-  return text;
+Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene) const {
+  MeshLoader loader = loader_;
+  auto built = std::make_shared<const Scene>(scene, loader);
+  std::vector<std::string> warnings = loader.changes();
+  warnings.insert(warnings.end(), loader.warnings().begin(), loader.warnings().end());
+  return {std::move(built), std::move(warnings)};
 }
 
-std::shared_ptr<const Scene> Reconfigurator::build_scene(const SceneSettings& scene) {
-  MeshLoader loader = loader_;
-  auto made = std::make_shared<const Scene>(scene, loader);
-  mesh_warnings_ = loader.changes();
-  mesh_warnings_.insert(mesh_warnings_.end(), loader.warnings().begin(), loader.warnings().end());
-  return made;
+/// Builds a scene whose obstacle motions start now, and sets their start times in `scene`.
+Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& scene) {
+  BuiltScene built = build_scene(scene);
+  start_motions(scene_time_s(), scene);
+  if (built.scene->has_moving_obstacles())
+    built.scene = std::make_shared<const Scene>(*built.scene, scene.meshes);
+  return built;
 }
 
 /// Virtual time has no warm-up: its result depends on the speed of the machine.
 std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& settings,
                                                            std::shared_ptr<const Scene> scene) {
-  auto placer = make_proxy_initializer(scene, proxy_search_mode_);
+  auto initializer = make_proxy_initializer(scene, proxy_search_mode_);
   auto rendering = std::make_unique<Rendering>(rendering_id_ + 1, settings, config_.profile, std::move(scene),
-                                               std::move(placer));
+                                               std::move(initializer));
   const HandlePose hand = loop_.telemetry().handle_pose();
   if (proxy_search_mode_ == ProxySearchMode::background) rendering->warm_up(hand.X_WH, hand.scene_time_s);
   return rendering;
@@ -137,10 +159,7 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
 void Reconfigurator::replace_scene(const std::filesystem::path& file) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = load_scene(file);
-  auto scene_built = build_scene(scene);
-  start_motions(scene_time_s(), scene);
-  if (scene_built->has_moving_obstacles())
-    scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
+  auto scene_built = build_starting_scene(scene).scene;
   Settings settings = config_.settings;
   settings.scene = file;
   auto rendering = build_rendering(settings, scene_built);
@@ -156,7 +175,7 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, now);
-  auto scene_built = build_scene(scene);
+  auto scene_built = build_scene(scene).scene;
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
   auto rendering = build_rendering(config_.settings, scene_built);
   offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
@@ -168,9 +187,9 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
-    refuse_unknown(name, scene);
+    reject_unknown(name, scene);
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
-  auto scene_built = build_scene(scene);
+  auto scene_built = build_scene(scene).scene;
   auto rendering = build_rendering(config_.settings, scene_built);
   offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
 }
@@ -207,7 +226,7 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
     if (std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), is_it))
       throw std::invalid_argument("'" + name +
                                   "' is a half_space, which cannot move; use a mesh for a moving obstacle");
-    refuse_unknown(name, scene);
+    reject_unknown(name, scene);
   }
   if (!is_finite(X_WO)) throw std::invalid_argument("the pose of '" + name + "' is not finite");
   if (!(duration_s > 0.0) || !(duration_s <= 86400.0))
@@ -318,67 +337,66 @@ void Reconfigurator::remove_model(std::uint32_t id) {
   loop_.requests().set_local_models(models_);
 }
 
-ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
-  const std::lock_guard lock(mutex_);
-  ReloadResult result;
-  const RunConfig config = read();
-  Settings settings = config_.settings;  // present values after the reload
-  Settings configured = file_settings_;  // values from files after the reload
-  bool needs_rendering = false, limits_changed = false;
+/// Applies every setting that the files have changed since the last reload and that the loop can take now.
+/// file: settings that were read from the files. Scene and profile are compared by their files instead.
+Reconfigurator::ReloadedSettings Reconfigurator::reload_settings(const Settings& file) const {
+  ReloadedSettings result{.present = config_.settings, .from_files = file_settings_};
   const bool armed = loop_.telemetry().state() == State::waiting || is_driving(loop_.telemetry().state());
   for (const Setting& setting : setting_table()) {
     if (setting.effect == Setting::Effect::scene || setting.effect == Setting::Effect::none) continue;
-    if (setting.equal(config.settings, file_settings_)) continue;
-    if (setting.effect == Setting::Effect::restart) {
-      result.not_applied.push_back(setting.name() + ": requires a restart");
+    if (setting.equal(file, file_settings_)) continue;
+    Settings wanted = result.present;
+    setting.copy(file, wanted);
+    const std::string reason = reason_not_to_apply(setting, result.present, wanted, config_.profile, armed);
+    if (!reason.empty()) {
+      result.not_applied.push_back(setting.name() + ": " + reason);
       continue;
     }
-    Settings wanted = settings;
-    setting.copy(config.settings, wanted);
-    if (setting.effect == Setting::Effect::limits) {
-      Settings allowed = wanted;
-      if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
-      if (!setting.equal(allowed, wanted)) {
-        result.not_applied.push_back(setting.name() + ": is looser than " +
-                                     to_text(setting.number(settings)) +
-                                     ", which holds as long as the loop is armed; disarm, and reload again");
-        continue;
-      }
-      limits_changed = true;
-    } else if (setting.effect == Setting::Effect::new_rendering) {
-      needs_rendering = true;
-    }
-    settings = wanted;
-    setting.copy(config.settings, configured);
+    result.limits_changed |= setting.effect == Setting::Effect::limits;
+    result.rendering_changed |= setting.effect == Setting::Effect::new_rendering;
+    result.present = wanted;
+    setting.copy(file, result.from_files);
     result.applied.push_back(setting.name());
   }
-  if (config.settings.device.profile == file_settings_.device.profile &&
-      contents(config.settings.device.profile_file) != profile_text_)
-    result.not_applied.emplace_back("the device profile was changed: requires a restart");
-  const std::string scene_files = files_fingerprint(config.scene);
-  const bool new_scene = scene_files != scene_fingerprint_;
-  SceneSettings scene = config_.scene;
-  auto scene_built = scene_;
-  if (new_scene) {
-    scene = config.scene;
-    scene_built = build_scene(scene);
-    start_motions(scene_time_s(), scene);
-    if (scene_built->has_moving_obstacles())
-      scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
-    settings.scene = configured.scene = config.settings.scene;
-    result.applied.emplace_back("scene");
-    result.mesh_warnings = mesh_warnings_;
+  return result;
+}
+
+bool Reconfigurator::is_profile_changed(const DeviceSettings& device) const {
+  return device.profile == file_settings_.device.profile && contents(device.profile_file) != profile_text_;
+}
+
+/// Builds the scene if its name or one of its files has changed since the last reload.
+Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& scene) {
+  std::string fingerprint = files_fingerprint(scene);
+  if (fingerprint == scene_fingerprint_) return {false, std::move(fingerprint), config_.scene, {scene_, {}}};
+  SceneSettings settings = scene;
+  BuiltScene built = build_starting_scene(settings);
+  return {true, std::move(fingerprint), std::move(settings), std::move(built)};
+}
+
+ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
+  const std::lock_guard lock(mutex_);
+  const RunConfig config = read();
+  ReloadedSettings settings = reload_settings(config.settings);
+  ReloadedScene scene = reload_scene(config.scene);
+  if (is_profile_changed(config.settings.device))
+    settings.not_applied.emplace_back("the device profile was changed: requires a restart");
+  if (scene.changed) {
+    settings.present.scene = settings.from_files.scene = config.settings.scene;
+    settings.applied.emplace_back("scene");
   }
   std::unique_ptr<Rendering> rendering;
-  if (needs_rendering || new_scene) rendering = build_rendering(settings, scene_built);
+  if (settings.rendering_changed || scene.changed)
+    rendering = build_rendering(settings.present, scene.built.scene);
 
   // Everything is valid.
-  if (limits_changed) loop_.requests().set_limits(settings.limits);
-  config_.settings = settings;
-  file_settings_ = configured;
-  scene_fingerprint_ = scene_files;
-  if (rendering) offer(std::move(rendering), settings, std::move(scene), std::move(scene_built));
-  return result;
+  if (settings.limits_changed) loop_.requests().set_limits(settings.present.limits);
+  config_.settings = settings.present;
+  file_settings_ = settings.from_files;
+  scene_fingerprint_ = scene.fingerprint;
+  if (rendering)
+    offer(std::move(rendering), settings.present, std::move(scene.settings), std::move(scene.built.scene));
+  return {settings.applied, settings.not_applied, scene.built.mesh_warnings};
 }
 
 Settings Reconfigurator::settings() const {

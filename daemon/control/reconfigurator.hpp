@@ -115,15 +115,40 @@ class Reconfigurator {
   static constexpr double kMoveDelay_s = 0.200;
 
  private:
-  std::string files_fingerprint(const SceneSettings& scene) const;
+  /// A scene with its meshes, and the repairs and warnings of the mesh loader.
+  struct BuiltScene {
+    std::shared_ptr<const Scene> scene;
+    std::vector<std::string> mesh_warnings;
+  };
+  /// Settings after a reload, and the keys that the files have changed.
+  struct ReloadedSettings {
+    Settings present;     ///< Values of the loop after the reload.
+    Settings from_files;  ///< Values from files after the reload; without those in not_applied.
+    bool limits_changed = false;
+    bool rendering_changed = false;  ///< True if the change needs a new rendering.
+    std::vector<std::string> applied = {};
+    std::vector<std::string> not_applied = {};
+  };
+  /// Scene after a reload.
+  struct ReloadedScene {
+    bool changed;             ///< True if the name or a file of the scene has changed since the last reload.
+    std::string fingerprint;  ///< files_fingerprint() of the scene.
+    SceneSettings settings;
+    BuiltScene built;
+  };
+
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
-  std::shared_ptr<const Scene> build_scene(const SceneSettings& scene);
+  BuiltScene build_scene(const SceneSettings& scene) const;
+  BuiltScene build_starting_scene(SceneSettings& scene);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
   void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
              std::shared_ptr<const Scene> built);
   void set_workspace(const WorkspaceRequest& request);
   LocalModelSet other_models(std::uint32_t id);
+  ReloadedSettings reload_settings(const Settings& file) const;
+  bool is_profile_changed(const DeviceSettings& device) const;
+  ReloadedScene reload_scene(const SceneSettings& scene);
 
   mutable std::mutex mutex_;       ///< protects all members but names_
   RunConfig config_;               ///< present values
@@ -134,7 +159,6 @@ class Reconfigurator {
   ServoLoop& loop_;
   ProxySearchMode proxy_search_mode_;
   MeshLoader loader_;
-  std::vector<std::string> mesh_warnings_;  ///< of the scene that was built last
   std::uint32_t rendering_id_ = 0;
   std::uint64_t checksum_ = 0;
   WorkspaceRequest workspace_;

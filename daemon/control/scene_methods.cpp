@@ -114,7 +114,8 @@ LocalModel model_of(const Json& params) {
   } else if (kind == "spring") {
     model.kind = LocalModel::Kind::spring;
     if (!params.contains("position_m"))
-      throw RpcError(RpcCode::invalid_params, "A spring needs 'position_m', its rest position in the world.");
+      throw RpcError(RpcCode::invalid_params,
+                     "A spring needs 'position_m', its equilibrium position in the world.");
   } else if (kind != "damping") {
     throw RpcError(RpcCode::invalid_params,
                    "There is no kind '" + kind + "' of local models; there are plane, spring, damping.");
@@ -325,7 +326,7 @@ void add_model_methods(MethodTable& table, Reconfigurator& reconfigurator) {
        {"lifetime_s", ParamType::number, true, "the model fades out after this time; at most 10"},
        {"normal", ParamType::vector, false, "plane: normal out of the solid"},
        {"offset_m", ParamType::number, false, "plane: solid where normal . x < offset_m"},
-       {"position_m", ParamType::vector, false, "spring: rest position in the world"},
+       {"position_m", ParamType::vector, false, "spring: equilibrium position in the world"},
        {"rotation_vector_rad", ParamType::vector, false, "spring: rest rotation in the world"},
        {"stiffness_N_per_m", ParamType::number, false, "plane or spring"},
        {"stiffness_Nm_per_rad", ParamType::number, false, "spring"},

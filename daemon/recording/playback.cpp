@@ -15,7 +15,7 @@ namespace wrenchd {
 namespace {
 
 bool is_good(const TickRecord& tick) {
-  return tick.fresh != 0 && tick.sample_fault == 0 && tick.released == 0;
+  return tick.fresh != 0 && tick.sample_fault == Fault::none && tick.released == 0;
 }
 
 std::vector<TimedPose> of_recording(const std::filesystem::path& file) {

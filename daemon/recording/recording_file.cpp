@@ -14,7 +14,7 @@
 namespace wrenchd {
 namespace {
 
-/// Version of the columns and their meaning. A reader of another version refuses the file.
+/// Version of the columns and their meaning. A reader of another version rejects the file.
 constexpr const char* kFormat = "7";
 constexpr hsize_t kChunkContacts = 1024;
 constexpr unsigned kDeflateLevel = 1;

@@ -15,9 +15,7 @@ class RecordedDevice final : public Device {
 
   void open() override {}
   DeviceSample read_newest(TimePoint) noexcept override;
-  Fault write(TimePoint, const Wrench&, bool) noexcept override {
-    return static_cast<Fault>(record_->write_fault);
-  }
+  Fault write(TimePoint, const Wrench&, bool) noexcept override { return record_->write_fault; }
   std::uint64_t commands_sent() const noexcept override { return record_->last_command_sent; }
   void release(TimePoint) noexcept override {}
   void wait_readable(TimePoint) noexcept override {}
@@ -80,7 +78,7 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   sample.motors_on = r.motors_on != 0;
   sample.watchdog_tripped = r.watchdog_tripped != 0;
   sample.homed = r.homed != 0;
-  sample.fault = static_cast<Fault>(r.sample_fault);
+  sample.fault = r.sample_fault;
   return sample;
 }
 

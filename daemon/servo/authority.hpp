@@ -10,7 +10,7 @@ struct Authority {
   State state = State::disconnected;
   double scale = 0.0;      ///< Share of the demanded wrench that may go out, 0 to 1.
   bool send = false;       ///< False while the self-test keeps silent to see the device's watchdog trip.
-  bool motors_on = false;  ///< What the command tells the motors.
+  bool motors_on = false;  ///< True if the command enables the motors.
 };
 
 }  // namespace wrenchd

@@ -20,7 +20,7 @@ struct Demand {
   bool sample_usable = false;
   bool calm = false;  ///< The handle is slow, and full authority would not push it much.
   bool interrupted =
-      false;  ///< The proxy became invalid in this tick, and not by a command: the ramp starts anew.
+      false;  ///< The proxy became invalid in this tick, and not by a command: the ramp starts again.
   bool proxy_invalidated = false;  ///< The proxy became invalid in this tick, by a command or not.
   bool in_contact = false;
   double stored_energy_J = 0.0;  ///< Energy that the contact springs hold.

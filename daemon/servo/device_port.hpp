@@ -38,7 +38,7 @@ class DevicePort {
 
   DeviceReading read(TimePoint now) noexcept;
 
-  /// Sends a wrench, if the authority lets the loop send anything. If the device has refused writes for too
+  /// Sends a wrench, if the authority lets the loop send anything. If the device has rejected writes for too
   /// long, it sends zero with the motors off at once: a device that listens again must not find an old
   /// wrench. X_BH_held: pose in B at which the world holds the handle, if it is known.
   Written write(TimePoint now, const Wrench& F, const Authority& authority,

@@ -31,7 +31,7 @@ struct Event {
   };
   /// The profile states no damping, so no stiffness bound can be computed.
   struct StabilityBoundUnknown {};
-  struct ArmingRefused {
+  struct ArmingRejected {
     State state;  ///< State in which the request to arm came.
   };
   /// No admissible pose exists near the proxy; the proxy stays where it was.
@@ -51,7 +51,7 @@ struct Event {
   struct RenderingChanged {
     std::uint32_t rendering_id;  ///< Rendering that is active from now on.
   };
-  using Data = std::variant<StateChanged, FaultRaised, StiffnessScaled, StabilityBoundUnknown, ArmingRefused,
+  using Data = std::variant<StateChanged, FaultRaised, StiffnessScaled, StabilityBoundUnknown, ArmingRejected,
                             ProjectionInfeasible, ProxySearchStarted, ProxyFound, ProxySearchFailed, Released,
                             CrossfadeStarted, RenderingChanged>;
 

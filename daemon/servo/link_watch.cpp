@@ -48,7 +48,7 @@ FaultSet LinkWatch::check(const DeviceSample& sample, TimePoint now) noexcept {
   bucket_ = std::max(bucket_ + kBadWeight * bad - kGoodWeight * good, 0.0);
   if (bucket_ > bucket_capacity_) {
     faults |= bit(Fault::link_lossy);
-    bucket_ = 0.0;  // the fault is raised once; later losses count anew
+    bucket_ = 0.0;  // the fault is raised once; later losses count from zero
   }
   if (now - sample.arrived > late_after_ || lag_exceeded(sample)) faults |= bit(Fault::sample_late);
   return faults;

@@ -17,7 +17,7 @@ namespace wrenchd {
 struct LocalModel {
   enum class Kind : std::uint8_t {
     plane,    ///< Half-space for the handle point: solid where normal_W . x < offset_m.
-    spring,   ///< Spring with its rest pose at X_WA.
+    spring,   ///< Spring with its equilibrium pose at X_WA.
     damping,  ///< Viscous field in the whole workspace.
   };
   static constexpr double kMaxLifetime_s = 10.0;  ///< Longest time from one update to the expiry.
@@ -26,7 +26,7 @@ struct LocalModel {
   Kind kind = Kind::damping;
   Vector3d normal_W = Vector3d::UnitZ();  ///< Unit normal of a plane, away from the solid.
   double offset_m = 0.0;                  ///< Distance of a plane from the world origin along normal_W.
-  Pose X_WA;                              ///< Rest pose of the handle for a spring.
+  Pose X_WA;                              ///< Equilibrium pose of the handle for a spring.
   double stiffness_N_per_m = 0.0;         ///< Stiffness of a plane or a spring.
   double stiffness_Nm_per_rad = 0.0;      ///< Angular stiffness of a spring.
   double damping_N_s_per_m = 0.0;         ///< Damping of the handle's velocity.

@@ -17,7 +17,7 @@ class OutputStage {
   /// guard: of the first rendering. Not RT-safe: copies the profile's limits.
   OutputStage(const LimitSettings& settings, const DeviceProfile& profile, const PassivityGuard& guard);
 
-  /// Replaces the passivity guard, after the delay of the loop was measured anew.
+  /// Replaces the passivity guard, after the delay of the loop was measured again.
   void set_guard(const PassivityGuard& guard) noexcept { stabilizer_.set_guard(guard); }
   /// Changes the limits. While the loop is armed, values looser than those that hold are ignored. Returns the
   /// limits that hold from now on, the profile's included.

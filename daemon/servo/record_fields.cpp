@@ -27,6 +27,7 @@ constexpr FieldType type_of() {
   if constexpr (std::is_same_v<T, std::uint64_t>) return FieldType::u64;
   if constexpr (std::is_same_v<T, std::int64_t>) return FieldType::i64;
   if constexpr (std::is_same_v<T, double>) return FieldType::f64;
+  if constexpr (std::is_enum_v<T>) return type_of<std::underlying_type_t<T>>();
 }
 
 template <class T>
@@ -144,9 +145,9 @@ std::vector<std::string> names_of(std::size_t count, const Name& name_of) {
 }
 
 std::vector<std::string> fault_names() {
-  return names_of(kFaultCount, [](std::size_t i) {
-    return i == 0 ? std::string("none") : std::string(fault_row(static_cast<Fault>(i)).name);
-  });
+  std::vector<std::string> names{std::string(fault_row(Fault::none).name)};
+  for (const FaultRow& row : fault_rows()) names.emplace_back(row.name);
+  return names;
 }
 
 }  // namespace

@@ -48,10 +48,10 @@ class Renderer {
   Demand compute_wrench(const ContactState& contact, const DeviceSample& sample, const Verdict& verdict,
                         const RenderingCrossfade::FadeLimits& limits, const TickTime& t) noexcept;
 
-  /// The next device may be another, with another clock: the laws start anew.
+  /// The next device may be another, with another clock: resets the wrench laws.
   void forget_device() noexcept;
 
-  /// The rendering that the hand feels.
+  /// The active rendering.
   const Rendering& active() const noexcept { return crossfade_.active(); }
   bool proxy_valid() const noexcept { return active().proxy_valid(); }
   /// What the last tick demanded, with the contact as it is now.

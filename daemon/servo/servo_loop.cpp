@@ -78,8 +78,8 @@ void ServoLoop::release(TimePoint now) noexcept {
   telemetry_.publish_release(now, supervisor_, renderer_.current_demand(), renderer_.active());
 }
 
-/// The way out of a tick: releases the hand, as far as the device can still be reached, and prepares for a
-/// device that is opened anew.
+/// Ends the operation of a device: releases the hand, as far as the device can still be reached, and prepares
+/// for a device that is opened next.
 Fault ServoLoop::leave(const TickTime& t, const Requests& asked, const DeviceReading& in,
                        const Written& last_write, TimePoint ready) noexcept {
   if (last_write.device_lost()) supervisor_.lose_device(t);

@@ -37,7 +37,7 @@ class ServoLoop {
   Fault run(Clock& clock, const std::atomic<bool>& stop) noexcept;
 
   /// One cycle of Algorithm 1 of the paper, at `now`, which was due at `due`. Returns the fault that changed
-  /// the state in it, or none. After device_lost the next tick is the first of a device that was opened anew.
+  /// the state in it, or none. After device_lost the next tick is the first tick of a newly opened device.
   /// RT-safe.
   Fault tick(TimePoint now, TimePoint due) noexcept;
 

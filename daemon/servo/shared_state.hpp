@@ -45,7 +45,8 @@ class SharedState {
   static_assert(sizeof(Header) <= kHeaderBytes && sizeof(StateRecord) % 8 == 0);
 
   /// Allocates memory for kRetention_s at rate_Hz, about 2 kB per tick, and touches every page so that no
-  /// tick causes a page fault. Throws std::system_error if the kernel refuses. Not RT-safe: system calls.
+  /// tick causes a page fault. Throws std::system_error if the kernel rejects the request. Not RT-safe:
+  /// system calls.
   explicit SharedState(double rate_Hz);
   /// Unmaps the memory and closes the descriptor. Not RT-safe: system calls.
   ~SharedState();

@@ -4,7 +4,7 @@
 namespace wrenchd {
 namespace {
 
-/// Time that a command takes to the motors, in periods of the device's reports, if no acknowledgement tells
+/// Time that a command takes to the motors, in periods of the device's reports, if no acknowledgement shows
 /// it.
 constexpr double kAssumedPeriods = 2.0;
 

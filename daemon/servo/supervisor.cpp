@@ -79,7 +79,7 @@ void Supervisor::apply_commands(CommandSet commands, bool proxy_valid, Verdict& 
   if (verdict.invalidate_proxy) machine_.on(Trigger::interrupted);
   if ((commands & kArm) == 0 || (commands & (kStop | kDisarm | kQuit | kClientLost)) != 0) return;
   if (!transition(Trigger::arm, machine_.state()).changes_state)
-    return events_.emit(t.now, Event::ArmingRefused{machine_.state()});
+    return events_.emit(t.now, Event::ArmingRejected{machine_.state()});
   if (proxy_valid && !verdict.invalidate_proxy) {
     verdict.invalidate_proxy = true;
     machine_.on(Trigger::interrupted);
@@ -145,7 +145,7 @@ void Supervisor::set_limits(const LimitSettings& limits) noexcept {
 }
 
 void Supervisor::raise(FaultSet faults, TimePoint now, double value) noexcept {
-  for (; faults != 0; faults &= faults - 1) raise(static_cast<Fault>(std::countr_zero(faults)), now, value);
+  for (; faults != 0; faults &= faults - 1) raise(first_fault(faults), now, value);
 }
 
 /// The log gets a fault that lasts once, and again if it changes the state.

@@ -41,9 +41,9 @@ class Supervisor {
   Authority authorise(const Demand& demand, const Stabilized& contact, bool overheated,
                       const DeviceSample& sample, TimePoint ready, const TickTime& t) noexcept;
 
-  /// The device is gone, found by a write. The way out: the caller releases.
+  /// The device is gone, found by a write. The caller must release the hand.
   void lose_device(const TickTime& t) noexcept { raise(Fault::device_lost, t.now); }
-  /// The process ends. The way out: the caller releases.
+  /// The process ends. The caller must release the hand.
   void end() noexcept { machine_.on(Trigger::process_end); }
   /// Forgets the device, after a release: the next one may be another.
   void forget_device() noexcept;

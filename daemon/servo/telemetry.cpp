@@ -8,11 +8,6 @@ namespace {
 
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
-std::array<double, 7> numbers(const Pose& X) noexcept {
-  const auto& [q, p] = X;
-  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
-}
-
 std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
   return {a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
 }
@@ -37,15 +32,15 @@ void record_sample(const DeviceReading& reading, TickRecord& record) noexcept {
   record.motors_on = sample.motors_on ? 1 : 0;
   record.watchdog_tripped = sample.watchdog_tripped ? 1 : 0;
   record.homed = sample.homed ? 1 : 0;
-  record.sample_fault = static_cast<std::uint8_t>(sample.fault);
-  record.X_BH = numbers(sample.X_BH);
+  record.sample_fault = sample.fault;
+  record.X_BH = numbers_of(sample.X_BH);
   record.V_BH = numbers(sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s);
 }
 
 void record_contact(const ContactState& contact, TickRecord& record) noexcept {
-  record.X_WP = numbers(contact.X_WP);
+  record.X_WP = numbers_of(contact.X_WP);
   record.X_WQ.fill(kNotSet);
-  if (contact.proxy_valid) record.X_WQ = numbers(contact.X_WQ);
+  if (contact.proxy_valid) record.X_WQ = numbers_of(contact.X_WQ);
   record.eps.fill(kNotSet);
   record.energy = record.kkt_residual = kNotSet;
   if (contact.following()) {
@@ -71,7 +66,7 @@ void record_demand(const Demand& demand, TickRecord& record) noexcept {
 
 void record_state(const Supervisor& supervisor, TickRecord& record) noexcept {
   record.state = static_cast<std::uint8_t>(supervisor.state());
-  record.state_cause = static_cast<std::uint8_t>(supervisor.cause());
+  record.state_cause = supervisor.cause();
   record.faults = supervisor.faults();
 }
 
@@ -86,7 +81,7 @@ void record_output(const TickResult& tick, TickRecord& record) noexcept {
   record.limit_causes = tick.limit_causes;
   record.F_out = numbers(tick.written.F.force_N, tick.written.F.torque_Nm);
   record.motors_commanded = tick.written.sent && tick.written.motors_on ? 1 : 0;
-  record.write_fault = static_cast<std::uint8_t>(tick.written.result);
+  record.write_fault = tick.written.result;
   record.released = tick.released ? 1 : 0;
 }
 
@@ -136,7 +131,7 @@ void Telemetry::publish_release(TimePoint now, const Supervisor& supervisor, con
 
 void Telemetry::show(const Rendering& rendering, bool crossfading) noexcept {
   state_.store(static_cast<State>(record_.state), std::memory_order_relaxed);
-  cause_.store(static_cast<Fault>(record_.state_cause), std::memory_order_relaxed);
+  cause_.store(record_.state_cause, std::memory_order_relaxed);
   rendering_id_.store(record_.rendering_id, std::memory_order_relaxed);
   crossfading_.store(crossfading, std::memory_order_relaxed);
   latest_record_.write(record_);

@@ -4,10 +4,12 @@
 #include <array>
 #include <cstdint>
 
+#include "core/fault.hpp"
+
 namespace wrenchd {
 
-/// Inputs, results and outputs of one tick, as plain numbers. A recording stores it, shared memory shows it
-/// to other programs, a replay compares it.
+/// Inputs, results and outputs of one tick, as numbers and enumerations. A recording stores it, shared memory
+/// shows it to other programs, a replay compares it.
 ///
 /// daemon/servo/tick_fields.def lists the fields in order: type, name, initial value, unit, frame and
 /// meaning. A pose is x y z [m], qx qy qz qw [-]. A wrench is fx fy fz [N], tx ty tz [N.m]. Frames:

@@ -43,7 +43,7 @@ Candidate evaluate(const UsbDevice& device, std::span<const DeviceProfile> profi
                    const DeviceCriteria& criteria) {
   const InspectedDevice inspected = inspect_device(device);
   const MatchResult match = match_profile(inspected.identity, profiles, criteria.profile);
-  if (!match.refusal.empty()) return {{}, match.refusal};
+  if (!match.rejection.empty()) return {{}, match.rejection};
   if (!match.profile) {
     for (std::size_t i = 0; i < profiles.size() && !criteria.profile.empty(); ++i)
       if (profiles[i].name == criteria.profile)

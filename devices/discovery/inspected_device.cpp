@@ -14,8 +14,8 @@ InspectedDevice inspect_device(const UsbDevice& device) {
   inspected.identity.usage = device.usage;
   try {
     inspected.descriptor = parse_report_descriptor(device.report_descriptor);
-  } catch (const DescriptorError& refused) {
-    inspected.descriptor_error = refused.what();
+  } catch (const DescriptorError& rejected) {
+    inspected.descriptor_error = rejected.what();
     return inspected;
   }
   for (const DescribedReport& report : inspected.descriptor->reports)

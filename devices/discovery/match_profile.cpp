@@ -90,7 +90,7 @@ MatchResult match_profile(const DeviceIdentity& device, std::span<const DevicePr
                           std::string_view named) {
   MatchResult result;
   if (const UnusableDevice* unusable = find_unusable_device(device.id)) {
-    result.refusal =
+    result.rejection =
         std::string(unusable->name) + " (" + text(device.id) + "): " + std::string(unusable->reason);
     result.rejections.assign(profiles.size(), "the device cannot be used");
     return result;
@@ -102,11 +102,12 @@ MatchResult match_profile(const DeviceIdentity& device, std::span<const DevicePr
     const int priority = rank(device, profiles[i]);
     if (priority > best) {
       result.profile = i;
-      result.refusal.clear();
+      result.rejection.clear();
     } else if (priority == best) {
       result.profile.reset();
-      result.refusal = "several profiles match " + text(device.id) + ", the last of them " +
-                       profiles[i].name + "; name one in the configuration, or add the serial number to one";
+      result.rejection = "several profiles match " + text(device.id) + ", the last of them " +
+                         profiles[i].name +
+                         "; name one in the configuration, or add the serial number to one";
     }
     best = std::max(best, priority);
   }

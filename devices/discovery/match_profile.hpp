@@ -32,7 +32,7 @@ struct DeviceIdentity {
 /// Matching profile of a device, and why the others do not match.
 struct MatchResult {
   std::optional<std::size_t> profile;  ///< index into the profiles
-  std::string refusal;  ///< why no profile is used: an unusable device, or several matching profiles
+  std::string rejection;  ///< why no profile is used: an unusable device, or several matching profiles
   /// One entry per profile, in their order: why it does not match; empty if it matches.
   std::vector<std::string> rejections;
 };

@@ -51,8 +51,6 @@ class HidrawLink final : public ReportLink {
   void close() noexcept override;
 
   const UsbDevice& device() const noexcept { return device_; }
-  /// Returns the writer while the link is open; nullptr otherwise.
-  const LatestWriter* writer() const noexcept { return writer_ ? &*writer_ : nullptr; }
 
  private:
   /// Longest report that the HID core of the kernel delivers.

@@ -45,7 +45,7 @@ class LatestWriter {
   /// failed. No other thread may call submit() any more. Not RT-safe: waits.
   bool close() noexcept;
 
-  /// False if the kernel refused the requested real-time priority; then raise the rtprio limit.
+  /// False if the kernel rejected the requested real-time priority; then raise the rtprio limit.
   bool priority_granted() const noexcept { return priority_granted_; }
   const WriteSlot& slot() const noexcept;
 
@@ -59,7 +59,7 @@ class LatestWriter {
 };
 
 /// Sets a thread to SCHED_FIFO with this priority; 0 leaves the thread unchanged. Returns false if the kernel
-/// refuses. Not RT-safe: system call.
+/// rejects the request. Not RT-safe: system call.
 bool raise_priority(std::thread& thread, int priority) noexcept;
 
 }  // namespace wrenchd

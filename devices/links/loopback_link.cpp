@@ -52,7 +52,7 @@ LinkRead LoopbackLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexc
 LinkStatus LoopbackLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
   advance_to(now);
   if (state_ != State::open) return LinkStatus::disconnected;
-  if (device_.fault_active_during(Kind::refuse_commands, now, now)) return LinkStatus::not_ready;
+  if (device_.fault_active_during(Kind::reject_commands, now, now)) return LinkStatus::not_ready;
   if (!commands_.push(now + command_delay_, report)) return LinkStatus::not_ready;
   advance_to(now);
   return LinkStatus::ok;

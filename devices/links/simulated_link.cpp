@@ -43,7 +43,7 @@ class ReportCollector final : public ReportSink {
   int reports_ = 0;
 };
 
-[[noreturn]] void refuse_layout(const DeviceProfile& profile, const char* emulator, const char* inherits) {
+[[noreturn]] void reject_layout(const DeviceProfile& profile, const char* emulator, const char* inherits) {
   throw std::invalid_argument("device profile " + profile.name +
                               " cannot be simulated: its reports differ from those of " + emulator +
                               ", which would emulate it; simulate a profile that inherits " + inherits);
@@ -87,7 +87,7 @@ std::unique_ptr<DeviceInHand> make_simulated_arm(const DeviceProfile& profile,
                                                  const SimulationSettings& settings) {
   const bool delta = profile.kinematics.kind == Kinematics::Kind::delta;
   if (!profile.wrench_report.efforts.present || !supports_profile(*emulated_arm(profile), profile))
-    refuse_layout(profile, delta ? "the Falcon" : "Polhem", delta ? "falcon" : "polhem");
+    reject_layout(profile, delta ? "the Falcon" : "Polhem", delta ? "falcon" : "polhem");
   return std::make_unique<SimulatedArm>(profile, settings, emulated_arm(profile));
 }
 
@@ -113,7 +113,7 @@ bool supports_profile(const PuckCoding& coding, const DeviceProfile& profile) {
 std::unique_ptr<DeviceInHand> make_simulated_puck(const DeviceProfile& profile,
                                                   const SimulationSettings& settings) {
   if (!supports_profile(puck_coding(profile), profile))
-    refuse_layout(profile, "a SpaceMouse", "spacemouse_split or spacemouse_combined");
+    reject_layout(profile, "a SpaceMouse", "spacemouse_split or spacemouse_combined");
   return std::make_unique<SimulatedPuck>(profile, settings);
 }
 

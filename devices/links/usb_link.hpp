@@ -55,7 +55,7 @@ class UsbLink final : public ReportLink {
 
   const UsbDevice& device() const noexcept { return device_; }
   UsbLinkCounts counts() const noexcept;
-  /// False if the kernel refused the requested real-time priority; then raise the rtprio limit.
+  /// False if the kernel rejected the requested real-time priority; then raise the rtprio limit.
   bool priority_granted() const noexcept;
   /// Slot of the writer while the link is open; nullptr otherwise.
   const WriteSlot* slot() const noexcept;

@@ -79,10 +79,7 @@ bool SimulatedFirmware::in_order(std::uint64_t sequence) const noexcept {
 
 bool SimulatedFirmware::take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
   const auto [outcome, report] = decode(wrench_layout_, bytes);
-  if (outcome != Decoding::ok || !in_order(report.sequence)) {
-    ++commands_rejected_;
-    return false;
-  }
+  if (outcome != Decoding::ok || !in_order(report.sequence)) return false;
   const double hold_s = report.hold_time_s > 0.0 ? report.hold_time_s : default_hold_s_;
   hold_until_ = now + from_seconds(std::min(hold_s, kMaxHold_s));
   last_command_ = report.sequence;

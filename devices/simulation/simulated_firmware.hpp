@@ -54,7 +54,6 @@ class SimulatedFirmware {
 
   bool motors_on() const noexcept { return motors_on_; }
   bool watchdog_tripped() const noexcept { return watchdog_tripped_; }
-  std::uint64_t commands_rejected() const noexcept { return commands_rejected_; }
 
  private:
   struct Encoder {
@@ -82,7 +81,6 @@ class SimulatedFirmware {
   bool motors_on_ = false;
   bool watchdog_tripped_ = false;
   bool watchdog_enabled_ = true;
-  std::uint64_t commands_rejected_ = 0;
 };
 
 }  // namespace wrenchd

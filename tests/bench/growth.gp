@@ -1,4 +1,4 @@
-# How the cost of contact grows with the number of triangles, drawn from what bench_contact --csv wrote.
+# Plots the cost of contact by the number of triangles from the output of bench_contact --csv.
 # Usage: gnuplot -c growth.gp RESULTS.csv PICTURE.svg
 set datafile separator ','
 set datafile missing NaN

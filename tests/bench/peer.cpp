@@ -35,7 +35,7 @@ PeerModule::Pair::Pair(const PeerModule& module, const TriangleMesh& A, const Tr
   const PeerMesh a = as_peer(A);
   const PeerMesh b = as_peer(B);
   peer_ = std::shared_ptr<void>(module.open_(&a, &b), module.close_);
-  if (peer_ == nullptr) throw std::runtime_error(module.file_.string() + " refuses the bodies");
+  if (peer_ == nullptr) throw std::runtime_error(module.file_.string() + " rejects the bodies");
 }
 
 double PeerModule::Pair::depth_m(int q, const PeerPose& X_BA) const {

@@ -28,7 +28,7 @@ struct PeerPose {
 /* The queries this module knows: what each is called, and null after the last. */
 const char* peer_query_name(int query);
 
-/* Null where the peer refuses the meshes. */
+/* Null if the peer rejects the meshes. */
 void* peer_open(const struct PeerMesh* A, const struct PeerMesh* B);
 void peer_close(void* peer);
 

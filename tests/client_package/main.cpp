@@ -3,7 +3,7 @@
 
 #include <wrenchd/client.hpp>
 
-/// No daemon is there: a client that links and runs says so.
+/// Without a daemon, a client that links and runs reports that the socket is missing.
 int main() {
   try {
     wrenchd::Client client("/nowhere/control.sock");

@@ -203,7 +203,7 @@ const std::string kForce = R"(force = { byte = 4, bits = 16, order = "big_endian
 const std::string kVelocity = "linear_velocity = { byte = 28, bits = 12, bit = 4, step_m_per_s = 0.001 }";
 const std::string kTranslation = R"(translation = { byte = 1, type = "i16", step_m = 4e-6 })";
 
-/// What kMouse has at the end of [deflection], and one key more.
+/// The end of [deflection] in kMouse with one additional key.
 std::string steering(const std::string& key) {
   return "angular_gain = 11.0\nfull_deflection_m = 0.001\nfull_deflection_rad = 0.09\n" + key;
 }
@@ -215,7 +215,7 @@ const std::vector<Bad> kTable = {
     {kWhole, "name = \"p\"", "nmae = \"p\"", "nmae", "did you mean 'name'?"},
     {kWhole, "\"hidraw\"", "\"hid\"", "\"hid\"", R"(expected "loopback", "hidraw" or "libusb")"},
     {kWhole, "transport = \"hidraw\"", "transport = \"libusb\"", "", "key 'endpoints' is missing"},
-    {kDelta, "\"libusb\"", "\"hidraw\"", "[endpoints]", "only transport = \"libusb\" speaks to endpoints"},
+    {kDelta, "\"libusb\"", "\"hidraw\"", "[endpoints]", "only transport = \"libusb\" uses endpoints"},
     {kDelta, "in = 0x81", "in = 0x01", "0x01", "from 129 to 143, found 1"},
     {kDelta, "out = 0x02", "out = 0x82", "0x82", "from 1 to 15, found 130"},
     {kDelta, "out = 0x02\n", "", "[endpoints]", "key 'endpoints.out' is missing"},
@@ -229,7 +229,7 @@ const std::vector<Bad> kTable = {
      R"(expected "free_running", "lock_step" or "silent_at_rest")"},
     {kMouse, "wrench_report = \"none\"\n", "", "", "key 'wrench_report' is missing"},
     {kMouse, "wrench_report = \"none\"", "wrench_report = \"no\"", "\"no\"", "expected a table"},
-    // which devices
+    // matched devices
     {kWhole, "usb = [\"1209:0001\"]\n", "", "[match]",
      "key 'match.usb': is missing; name at least one device"},
     {kWhole, "[\"1209:0001\"]", "[]", "[]", "is empty; name at least one device"},
@@ -254,7 +254,7 @@ const std::vector<Bad> kTable = {
     {kArm, "max_force_N = 5.0", "max_force_N = 5.0\nmax_torque_Nm = 0.1", "0.1\nmax",
      "the device takes no torque"},
     {kMouse, "[limits]", "[limits]\nmax_force_N = 1.5", "1.5", "the device takes no force"},
-    // limits that may be left out
+    // optional limits
     {kWhole, "[closed_loop]", "workspace_radius_m = \"wide\"\n[closed_loop]", "\"wide\"",
      "expected a number from 0.01 to 2 m"},
     {kWhole, "[closed_loop]", "workspace_radius_m = -0.2\n[closed_loop]", "-0.2", "found -0.2"},
@@ -297,7 +297,7 @@ const std::vector<Bad> kTable = {
      "the device takes no torque"},
     {kMouse, "[limits]", "[limits]\nmax_power_W = 7", "7\nmax", "the device has no motors"},
     {kMouse, "[limits]", "[limits]\nworkspace_radius_m = 0.1", "0.1\nmax", "the device has no motors"},
-    // what buttons mean
+    // meanings of buttons
     {kWhole, "[closed_loop]", "[buttons]\ndeadman = \"yes\"\n[closed_loop]", "\"yes\"",
      "expected a whole number from 0 to 31"},
     {kWhole, "[closed_loop]", "[buttons]\ndeadman = -1\n[closed_loop]", "-1\n", "from 0 to 31, found -1"},
@@ -402,14 +402,14 @@ const std::vector<Bad> kTable = {
      "cannot be distinguished from 'pose_report': same id"},
     {kMouse, "id = 2\n", "id = \"none\"\n", "[[more_reports]]", "must both have an id, or neither"},
     {kMouse, "id = 2\nlength = 7\n", "id = 2\n", "[[more_reports]]", "more_reports[0].length' is missing"},
-    // what makes a pose
+    // sources of the pose
     {kMouse, "[deflection]\nmode = \"rate\"\nlinear_gain = 71.0\nangular_gain = 11.0\n", "", "[pose_report]",
      "a translation or rotation moves a pose only by [deflection]; state it"},
     {kMouse, kTranslation, "joints = { byte = 1, type = \"i16\" }", "[pose_report]", "leave all but one out"},
     {kMouse, "mode = \"rate\"", "mode = \"speed\"", "\"speed\"", R"(expected "rate" or "position")"},
     {kMouse, "linear_gain = 71.0\n", "", "[deflection]", "key 'deflection.linear_gain' is missing"},
     {kMouse, "angular_gain = 11.0", "angular_gain = 0", "0", "from 0.001 to 1000000, found 0"},
-    // how a cap steers
+    // deflection of a puck
     {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\ndead_zone = 0.1", "0.1",
      "state full_deflection_m and full_deflection_rad"},
     {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nfull_deflection_m = 0.001", "0.001",
@@ -462,12 +462,12 @@ const std::vector<Bad> kTable = {
      "the workspace must be larger than travel_m"},
     {kWhole, "[closed_loop]", "[homing]\nmax_rotation_rad = 0.1\n[closed_loop]", "0.1\n[closed",
      "must be no less than travel_rad"},
-    {kWhole, "[closed_loop]", "[homing]\nrest_m = [0, 0, 0]\n[closed_loop]", "rest_m",
+    {kWhole, "[closed_loop]", "[homing]\nreference_m = [0, 0, 0]\n[closed_loop]", "reference_m",
      "known keys here: 'reference'"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_kg = 250.0\n[closed_loop]", "250.0", "from 0 to 20 kg"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_g = 250.0\n[closed_loop]", "handle_g",
      "give it in kg as 'handle_kg'"},
-    // reports that never change
+    // fixed reports
     {kWhole, "\"04 00\"", "\"4\"", "\"4\"", "a byte is two hexadecimal digits"},
     {kWhole, "\"04 00\"", "\"\"", "\"\"", "has 0 bytes; a report has 1 to 64"},
     {kWhole, "\"04 00\"", "[4, 0]", "[4, 0]", "expected a text"},

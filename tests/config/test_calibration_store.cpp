@@ -44,7 +44,7 @@ std::string contents(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// A store in a directory of its own, which does not exist yet.
+/// A store in a separate directory that does not exist yet.
 struct Bench {
   TemporaryDirectory dir;
   fs::path place = dir.path() / "state" / "calibration";
@@ -55,8 +55,8 @@ struct Bench {
     const auto read = store.read(calibration.profile, calibration.serial);
     return read && same(*read, calibration);
   }
-  /// Why the file is refused; empty where it is not.
-  std::string refusal() const {
+  /// Returns the message with which the file is rejected; empty if it is read.
+  std::string rejection() const {
     try {
       store.read("polhem", "A-0017");
     } catch (const ConfigError& error) {
@@ -70,7 +70,7 @@ struct Bench {
   }
 };
 
-/// With its checksum, so that only what stands in it is judged.
+/// Returns the text with a valid checksum, so that the test covers its content.
 std::string sealed(const std::string& body) {
   boost::crc_32_type crc;
   crc.process_bytes(body.data(), body.size());
@@ -79,15 +79,15 @@ std::string sealed(const std::string& body) {
   return text.str();
 }
 
-TEST_CASE("what is written is read back, bit for bit", "[calibration]") {
+TEST_CASE("a written calibration is read back bit for bit", "[calibration]") {
   Bench bench;
-  CHECK_FALSE(bench.store.read("polhem", "A-0017"));  // never calibrated is no error
+  CHECK_FALSE(bench.store.read("polhem", "A-0017"));  // a missing calibration is not an error
   bench.store.write(kOld);
   CHECK(bench.holds(kOld));
   bench.store.write(kNew);
   CHECK(bench.holds(kNew));
   CHECK_FALSE(bench.store.read("polhem", "A-0018"));
-  CHECK_FALSE(bench.store.read("other", "A-0017"));  // the same serial number of another model
+  CHECK_FALSE(bench.store.read("other", "A-0017"));  // same serial number, other model
 
   RandomValues random(6);
   for (int i = 0; i < 100; ++i) {
@@ -100,7 +100,7 @@ TEST_CASE("what is written is read back, bit for bit", "[calibration]") {
   }
 }
 
-TEST_CASE("a person can read the file, and anybody may", "[calibration]") {
+TEST_CASE("the file is text and readable by all users", "[calibration]") {
   Bench bench;
   bench.store.write(kOld);
   CHECK(contents(bench.file)
@@ -110,23 +110,23 @@ TEST_CASE("a person can read the file, and anybody may", "[calibration]") {
   struct stat status {};
   REQUIRE(stat(bench.file.c_str(), &status) == 0);
   CHECK((status.st_mode & 0777) == 0644);
-  CHECK(std::distance(fs::directory_iterator(bench.place), {}) == 1);  // nothing is left beside it
+  CHECK(std::distance(fs::directory_iterator(bench.place), {}) == 1);  // no temporary file remains
 }
 
-TEST_CASE("every truncation of a file is refused", "[calibration]") {
+TEST_CASE("every truncation of a file is rejected", "[calibration]") {
   Bench bench;
   const std::string whole = to_text(kOld);
   bench.put(whole);
   REQUIRE(bench.holds(kOld));
   for (std::size_t length = 0; length < whole.size(); ++length) {
     bench.put(whole.substr(0, length));
-    CHECK_FALSE(bench.refusal().empty());
+    CHECK_FALSE(bench.rejection().empty());
   }
 }
 
-TEST_CASE("every change of one byte is refused, and every byte more", "[calibration]") {
+TEST_CASE("every change of one byte and every additional byte is rejected", "[calibration]") {
   const std::string whole = to_text(kOld);
-  const auto refused = [](const std::string& text) {
+  const auto rejected = [](const std::string& text) {
     try {
       parse_calibration(text, "a file");
     } catch (const ConfigError&) {
@@ -134,27 +134,27 @@ TEST_CASE("every change of one byte is refused, and every byte more", "[calibrat
     }
     return false;
   };
-  REQUIRE_FALSE(refused(whole));
+  REQUIRE_FALSE(rejected(whole));
   int accepted = 0;
   for (std::size_t i = 0; i < whole.size(); ++i)
     for (int byte = 0; byte < 256; ++byte) {
       std::string changed = whole;
       changed[i] = static_cast<char>(byte);
-      accepted += changed != whole && !refused(changed);
+      accepted += changed != whole && !rejected(changed);
     }
   for (std::size_t i = 0; i <= whole.size(); ++i)
     for (const char more : {'0', '\n', ' ', '\0'}) {
       std::string longer = whole;
       longer.insert(i, 1, more);
-      accepted += longer != whole && !refused(longer);
+      accepted += longer != whole && !rejected(longer);
       std::string shorter = whole;
       shorter.erase(i, 1);
-      accepted += i < whole.size() && !refused(shorter);
+      accepted += i < whole.size() && !rejected(shorter);
     }
   CHECK(accepted == 0);
 }
 
-TEST_CASE("foreign files and those of another format are refused with the cure", "[calibration]") {
+TEST_CASE("other files and other format versions are rejected with the remedy", "[calibration]") {
   struct Bad {
     std::string text;
     std::string message;
@@ -190,25 +190,26 @@ TEST_CASE("foreign files and those of another format are refused with the cure",
        }) {
     INFO(bad.text.substr(0, 200));
     bench.put(bad.text);
-    const std::string message = bench.refusal();
+    const std::string message = bench.rejection();
     INFO(message);
     CHECK(message.find(bench.file.string()) == 0);
     CHECK(message.find(bad.message) != std::string::npos);
   }
 }
 
-TEST_CASE("what is no regular file is refused", "[calibration]") {
+TEST_CASE("only regular files are accepted", "[calibration]") {
   Bench bench;
   fs::create_directories(bench.file);
-  CHECK(bench.refusal().find("is not a regular file") != std::string::npos);
+  CHECK(bench.rejection().find("is not a regular file") != std::string::npos);
   fs::remove(bench.file);
   const auto elsewhere = bench.dir.write("elsewhere", to_text(kOld));
   fs::create_symlink(elsewhere, bench.file);
-  CHECK(bench.refusal().find("cannot be opened") != std::string::npos);
+  CHECK(bench.rejection().find("cannot be opened") != std::string::npos);
   fs::remove(bench.file);
   REQUIRE(mkfifo(bench.file.c_str(), 0600) == 0);
-  CHECK(bench.refusal().find("is not a regular file") != std::string::npos);  // and nobody waits for a writer
-  // Writing replaces whatever has the name, and follows nothing.
+  CHECK(bench.rejection().find("is not a regular file") !=
+        std::string::npos);  // the read does not wait for a writer
+  // Writing replaces any file of that name and follows no link.
   fs::remove(bench.file);
   fs::create_symlink(elsewhere, bench.file);
   bench.store.write(kNew);
@@ -216,7 +217,7 @@ TEST_CASE("what is no regular file is refused", "[calibration]") {
   CHECK(contents(elsewhere) == to_text(kOld));
 }
 
-TEST_CASE("hostile serial numbers stay in the directory, and each keeps a file of its own", "[calibration]") {
+TEST_CASE("any serial number gets a file of its own inside the directory", "[calibration]") {
   Bench bench;
   const std::vector<std::string> names = {".",
                                           "..",
@@ -256,14 +257,14 @@ TEST_CASE("hostile serial numbers stay in the directory, and each keeps a file o
     }
   CHECK(static_cast<std::size_t>(std::distance(fs::directory_iterator(bench.place), {})) == made);
   CHECK(std::distance(fs::directory_iterator(bench.dir.path()), {}) == 1);
-  CHECK(bench.store.read("polhem", "..")->offsets.at(0).offset == 2.0);  // none has taken another's place
+  CHECK(bench.store.read("polhem", "..")->offsets.at(0).offset == 2.0);  // each name has its own file
 
   CHECK_THROWS_WITH(bench.store.file_of("polhem", ""), Catch::Contains("has no serial number"));
   CHECK_THROWS_WITH(bench.store.file_of("", "A"), Catch::Contains("has no name"));
   CHECK_THROWS_WITH(bench.store.file_of("polhem", std::string(80, '/')), Catch::Contains("too long"));
 }
 
-TEST_CASE("what could not be read back is not written", "[calibration]") {
+TEST_CASE("a calibration that could not be read back is not written", "[calibration]") {
   Bench bench;
   bench.store.write(kOld);
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -273,7 +274,7 @@ TEST_CASE("what could not be read back is not written", "[calibration]") {
   CHECK(bench.holds(kOld));
 }
 
-TEST_CASE("the state directory is systemd's, or the usual one", "[calibration]") {
+TEST_CASE("the state directory is that of systemd, or the default", "[calibration]") {
   const char* before = std::getenv("STATE_DIRECTORY");
   const std::string kept = before != nullptr ? before : "";
   setenv("STATE_DIRECTORY", "/var/lib/one:/var/lib/two", 1);
@@ -285,7 +286,7 @@ TEST_CASE("the state directory is systemd's, or the usual one", "[calibration]")
   if (before != nullptr) setenv("STATE_DIRECTORY", kept.c_str(), 1);
 }
 
-/// Runs `work` in a process of its own, after `prepare` has spoilt something there. Returns how it ended.
+/// Runs `prepare` and then `work` in a child process. Returns its exit status.
 int in_child(const std::function<bool()>& prepare, const std::function<int()>& work) {
   const pid_t child = fork();
   REQUIRE(child >= 0);
@@ -295,7 +296,7 @@ int in_child(const std::function<bool()>& prepare, const std::function<int()>& w
   return status;
 }
 
-/// From here on, one system call meets this fate.
+/// Makes one system call fail in this way from now on.
 bool forbid(long call, std::uint32_t fate) {
   sock_filter filter[] = {
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
@@ -308,7 +309,7 @@ bool forbid(long call, std::uint32_t fate) {
          prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
-/// From here on, files end after so many bytes: the first of them are written, and the rest is not.
+/// Limits the size of files from now on: bytes beyond the limit are not written.
 bool let_files_be_short(rlim_t bytes) {
   std::signal(SIGXFSZ, SIG_IGN);
   const rlimit limit{bytes, bytes};
@@ -342,7 +343,7 @@ TEST_CASE("a crash between any two steps leaves the old calibration or the new o
     REQUIRE(WIFSIGNALED(status));
     REQUIRE(WTERMSIG(status) == SIGSYS);
     CHECK(bench.holds(*step.left));
-    bench.store.write(kNew);  // and what was left behind is in nobody's way
+    bench.store.write(kNew);  // a remaining temporary file does not interfere
     CHECK(bench.holds(kNew));
   }
 }
@@ -371,7 +372,7 @@ TEST_CASE("a disk that is full, or a directory that is locked, leaves the old ca
     REQUIRE(WIFEXITED(status));
     CHECK(WEXITSTATUS(status) == 42);
     CHECK(bench.holds(kOld));
-    CHECK(std::distance(fs::directory_iterator(bench.place), {}) == 1);  // nothing is left beside it
+    CHECK(std::distance(fs::directory_iterator(bench.place), {}) == 1);  // no temporary file remains
   }
   const CalibrationStore nowhere("/proc/wrenchd/calibration");
   CHECK_THROWS_WITH(nowhere.write(kOld),

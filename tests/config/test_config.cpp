@@ -44,7 +44,7 @@ void print(std::ostream& out, const SimulationSettings& s) {
   out << s.hand_repeats << s.hand_script << s.hand_path.size() << '\n';
 }
 
-/// Every setting, so that two of them can be compared and a difference be read.
+/// Returns all settings as text, so that a comparison shows the difference.
 std::string printed(const Settings& s) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
@@ -77,7 +77,7 @@ std::string printed(const Settings& s) {
   return out.str();
 }
 
-/// The defaults of the structs, with the files they name where the shipped ones are.
+/// Returns the defaults of the structs, with the paths of the shipped files.
 Settings defaults() {
   Settings settings;
   settings.scene = kConfig / settings.scene;
@@ -103,7 +103,7 @@ std::vector<fs::path> shipped(const std::string& folder) {
   return files;
 }
 
-/// A locale that writes 1,5 for one and a half.
+/// A locale with a decimal comma.
 struct Comma : std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }
@@ -112,11 +112,11 @@ struct Comma : std::numpunct<char> {
 
 }  // namespace
 
-TEST_CASE("wrenchd.toml as shipped holds the defaults", "[config]") {
+TEST_CASE("the shipped wrenchd.toml contains the defaults", "[config]") {
   CHECK(printed(load_settings(kConfig / "wrenchd.toml", kShipped)) == printed(defaults()));
 }
 
-TEST_CASE("an empty wrenchd.toml holds the defaults", "[config]") {
+TEST_CASE("an empty wrenchd.toml has the default values", "[config]") {
   CHECK(printed(settings_from("")) == printed(defaults()));
 }
 
@@ -135,7 +135,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
   CHECK(options == 60);
 }
 
-TEST_CASE("every shipped file loads", "[config]") {
+TEST_CASE("every shipped file is valid", "[config]") {
   for (const auto& file : shipped("profiles")) {
     INFO(file);
     CHECK(load_profile(file).name == file.stem());
@@ -158,8 +158,7 @@ TEST_CASE("the shipped scene is a cube over a table", "[config]") {
   CHECK(scene.half_spaces[0].normal_W == Vector3d::UnitZ());
 }
 
-TEST_CASE("the shipped plunger comes out of the table to and fro, within reach of the shipped hand",
-          "[config]") {
+TEST_CASE("the shipped plunger moves periodically, within reach of the shipped hand", "[config]") {
   const SceneSettings scene = load_scene(kConfig / "scenes/cube_over_plunger.toml");
   REQUIRE(scene.half_spaces.size() == 1);
   REQUIRE(scene.meshes.size() == 1);
@@ -174,13 +173,13 @@ TEST_CASE("the shipped plunger comes out of the table to and fro, within reach o
   CHECK(top_m(2.0 * back_s) == Approx(-0.010));
   SimulationSettings s;
   load_hand_script(kConfig / "hands/press_and_rock.toml", s);
-  CHECK(s.hand_path.front().position_m.z() - half_m > top_m(back_s));  // it starts free
+  CHECK(s.hand_path.front().position_m.z() - half_m > top_m(back_s));  // it starts without contact
   double lowest_m = 1.0;
   for (const Waypoint& w : s.hand_path) lowest_m = std::min(lowest_m, w.position_m.z() - half_m);
   CHECK(lowest_m < top_m(back_s));
 }
 
-TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") {
+TEST_CASE("a mesh may have a velocity; without one it is at rest", "[config]") {
   const auto motion = [](const std::string& keys) {
     const SceneSettings scene =
         scene_from("[tool]\nmesh = 'cube.off'\n[[obstacle]]\nmesh = 'cube.off'\n" + keys);
@@ -201,7 +200,7 @@ TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") 
   CHECK(turning.reverse_after_s == 0.0);
 }
 
-TEST_CASE("a mesh may be made instead of read", "[config]") {
+TEST_CASE("a mesh may be generated instead of read", "[config]") {
   const SceneSettings scene = scene_from(
       "[tool]\nmesh = { make = 'gear', triangles = 5000 }\nscale = 2\n"
       "[[obstacle]]\nmesh = { make = 'boulder', seed = 7 }\nkind = 'surface'\n"
@@ -224,7 +223,7 @@ TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {
   SimulationSettings s;
   load_hand_script(kConfig / "hands/press_and_rock.toml", s);
   CHECK(s.hand_repeats);
-  constexpr double kPeakOverMean = 1.875;  // of a minimum-jerk move
+  constexpr double kPeakOverMean = 1.875;  // ratio of peak to mean speed of a minimum-jerk motion
   for (std::size_t i = 1; i < s.hand_path.size(); ++i) {
     const Waypoint& a = s.hand_path[i - 1];
     const Waypoint& b = s.hand_path[i];
@@ -250,7 +249,7 @@ TEST_CASE("a gain is a number, two blocks, or a matrix", "[config]") {
   CHECK(K(5, 5) == 6.0);
 }
 
-TEST_CASE("one coefficient of friction stands for both", "[config]") {
+TEST_CASE("one friction coefficient sets both", "[config]") {
   const auto read = [](const std::string& text) {
     return settings_from("[rendering.friction]\n" + text).rendering.friction;
   };
@@ -271,13 +270,13 @@ TEST_CASE("a placement may give position or rotation only", "[config]") {
   CHECK(device.base_in_world.rotation_vector_rad == Vector3d(0.0, 0.0, 1.5));
 }
 
-TEST_CASE("whole numbers and numbers stand for each other where that is exact", "[config]") {
+TEST_CASE("integers and real numbers are interchangeable if the conversion is exact", "[config]") {
   CHECK(settings_from("[servo]\nrate_Hz = 2000").servo.rate_Hz == 2000.0);
   CHECK(settings_from("[servo]\npriority = 40.0").servo.priority == 40);
   CHECK_THROWS_AS(settings_from("[servo]\npriority = 40.5"), ConfigError);
 }
 
-TEST_CASE("the locale does not matter", "[config]") {
+TEST_CASE("loading does not depend on the locale", "[config]") {
   const std::locale before = std::locale::global(std::locale(std::locale::classic(), new Comma));
   const std::string loaded = printed(load_settings(kConfig / "wrenchd.toml", kShipped));
   std::string message;
@@ -291,7 +290,7 @@ TEST_CASE("the locale does not matter", "[config]") {
   CHECK(message.find("expected a number from 0.25 to 5 s, found 1234.5") != std::string::npos);
 }
 
-TEST_CASE("files named in wrenchd.toml are looked for beside it first", "[config]") {
+TEST_CASE("files named in wrenchd.toml are searched beside it first", "[config]") {
   const TemporaryDirectory dir;
   dir.write("my_scene.toml", "");
   dir.write("scenes/cube_on_table.toml", "");
@@ -308,7 +307,7 @@ TEST_CASE("a scene without obstacles is free space", "[config]") {
   CHECK(scene.tool.mass_kg == 1.0);
 }
 
-TEST_CASE("mass stands in [tool] or at the top", "[config]") {
+TEST_CASE("the mass may be in [tool] or at the top", "[config]") {
   CHECK(scene_from("mass = 3\n[tool]\nmesh = 'cube.off'").tool.mass_kg == 3.0);
   CHECK(scene_from("[tool]\nmesh = 'cube.off'\nmass = 4.0").tool.mass_kg == 4.0);
 }
@@ -326,7 +325,7 @@ TEST_CASE("a normal of any length describes the same solid", "[config]") {
   CHECK(scene.half_spaces[1].name == "obstacle[1]");
 }
 
-TEST_CASE("a profile's fields come out as they stand", "[config]") {
+TEST_CASE("all fields of a profile are read", "[config]") {
   const DeviceProfile p = load_profile(kConfig / "profiles/example.toml");
   CHECK(p.max_force_N == 6.0);
   CHECK(p.wrench_point == WrenchPoint::handle);
@@ -343,7 +342,7 @@ TEST_CASE("a profile's fields come out as they stand", "[config]") {
   CHECK(p.wrench_report.enable.bit == 7);
 }
 
-TEST_CASE("what a profile leaves out is not there", "[config]") {
+TEST_CASE("fields that a profile omits are absent", "[config]") {
   const TemporaryDirectory dir;
   std::string text = text_of(kConfig / "profiles/example.toml");
   for (const std::string key :
@@ -357,7 +356,7 @@ TEST_CASE("what a profile leaves out is not there", "[config]") {
   CHECK(p.stale_fault_s == DeviceProfile{}.stale_fault_s);
 }
 
-TEST_CASE("a hand script of one waypoint holds still", "[config]") {
+TEST_CASE("a hand script with one waypoint keeps the hand at rest", "[config]") {
   const TemporaryDirectory dir;
   SimulationSettings s;
   load_hand_script(dir.write("h.toml", "[[waypoint]]\ntime_s = 0\nposition_m = [0, 0, 0.1]"), s);

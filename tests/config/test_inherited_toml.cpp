@@ -29,7 +29,7 @@ std::string rejection_text(const std::filesystem::path& file, const SearchPath& 
 
 }  // namespace
 
-TEST_CASE("a profile lies over its parent, key by key", "[inherited_toml]") {
+TEST_CASE("a profile overrides its parent key by key", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path() / "etc", WRENCHD_SOURCE_DIR "/config"});
   const auto file =
@@ -48,7 +48,7 @@ TEST_CASE("a profile lies over its parent, key by key", "[inherited_toml]") {
   CHECK(mine.wrench_report.length == parent.wrench_report.length);
 }
 
-TEST_CASE("a chain of any length, the nearest says last", "[inherited_toml]") {
+TEST_CASE("in a chain of parents the nearest value applies", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path(), WRENCHD_SOURCE_DIR "/config"});
   dir.write("profiles/a.toml",
@@ -60,7 +60,7 @@ TEST_CASE("a chain of any length, the nearest says last", "[inherited_toml]") {
   CHECK(c.watchdog_s == 0.03);
 }
 
-TEST_CASE("the administrator's file may inherit the package's of the same name", "[inherited_toml]") {
+TEST_CASE("the administrator's file may inherit the package's file of the same name", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path() / "etc", WRENCHD_SOURCE_DIR "/config"});
   const auto file =
@@ -72,7 +72,7 @@ TEST_CASE("the administrator's file may inherit the package's of the same name",
   CHECK(std::count(files.begin(), files.end(), kLoopback) == 0);
 }
 
-TEST_CASE("profiles that inherit each other are refused with the whole way", "[inherited_toml]") {
+TEST_CASE("profiles that inherit each other are rejected with the whole chain", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
   dir.write("profiles/a.toml", inheriting("b"));
@@ -84,19 +84,19 @@ TEST_CASE("profiles that inherit each other are refused with the whole way", "[i
   CHECK_THAT(rejection_text(self, search), Contains("self.toml:1:12: ") && Contains("must not inherit"));
 }
 
-TEST_CASE("a parent that is not there, or has no name, is refused", "[inherited_toml]") {
+TEST_CASE("a missing or unnamed parent is rejected", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
-  const auto file = dir.write("profiles/a.toml", "\n" + inheriting("nobody"));
+  const auto file = dir.write("profiles/a.toml", "\n" + inheriting("missing"));
   CHECK_THAT(rejection_text(file, search),
              Contains("a.toml:2:12: key 'inherits': no profile of this name; searched ") &&
-                 Contains("profiles/nobody.toml"));
+                 Contains("profiles/missing.toml"));
   CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = 3\n"), search),
              Contains("a.toml:1:12: key 'inherits': expected the name of a profile"));
   CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = \"\"\n"), search), Contains(":1:12: "));
 }
 
-TEST_CASE("what is wrong with a parent is told at its place in the parent", "[inherited_toml]") {
+TEST_CASE("defects of a parent are reported with their location in the parent", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path(), WRENCHD_SOURCE_DIR "/config"});
   const auto parent = dir.write("profiles/a.toml", inheriting("loopback", "name = 'a'\nwatchdog_s = 7\n"));

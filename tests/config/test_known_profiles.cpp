@@ -11,10 +11,10 @@ using namespace test;
 
 const std::filesystem::path kConfig = WRENCHD_SOURCE_DIR "/config";
 
-TEST_CASE("every shipped profile is known, by the names of their files", "[known_profiles]") {
+TEST_CASE("every shipped profile is listed under the name of its file", "[known_profiles]") {
   const SearchPath shipped({kConfig});
   const KnownProfiles known = known_profiles(shipped);
-  CHECK(known.refused.empty());
+  CHECK(known.rejected.empty());
   CHECK(known.profiles.size() == profile_files(shipped).size());
   REQUIRE(known.profiles.size() > 2);
   CHECK(known.profiles[0].name == "example");
@@ -22,7 +22,7 @@ TEST_CASE("every shipped profile is known, by the names of their files", "[known
   CHECK(known.files[1].filename() == "falcon.toml");
 }
 
-TEST_CASE("profiles that are refused are told, and hide no other", "[known_profiles]") {
+TEST_CASE("rejected profiles are reported and do not affect others", "[known_profiles]") {
   const TemporaryDirectory dir;
   dir.write("profiles/aaa.toml", "inherits = \"falcon\"\nname = \"mine\"\n");
   dir.write("profiles/bbb.toml", "name = \"no end\n");
@@ -30,26 +30,26 @@ TEST_CASE("profiles that are refused are told, and hide no other", "[known_profi
   const KnownProfiles known = known_profiles(SearchPath({dir.path(), kConfig}));
   CHECK(known.profiles.size() == profile_files(SearchPath({kConfig})).size() + 1);
   CHECK(known.profiles[0].name == "mine");
-  REQUIRE(known.refused.size() == 2);
-  CHECK_THAT(known.refused[0], Catch::Contains("profiles/bbb.toml:1:"));
-  CHECK_THAT(known.refused[1],
+  REQUIRE(known.rejected.size() == 2);
+  CHECK_THAT(known.rejected[0], Catch::Contains("profiles/bbb.toml:1:"));
+  CHECK_THAT(known.rejected[1],
              Catch::Contains("profiles/ccc.toml:3:1: ") && Catch::Contains("did you mean 'report_rate_Hz'"));
 }
 
-TEST_CASE("the administrator's profile hides the shipped one of its name, even where it is refused",
+TEST_CASE("the administrator's profile overrides the shipped profile of its name, even if it is rejected",
           "[known_profiles]") {
   const TemporaryDirectory dir;
   dir.write("profiles/falcon.toml", "name = 3\n");
   const KnownProfiles known = known_profiles(SearchPath({dir.path(), kConfig}));
-  CHECK(known.refused.size() == 1);
+  CHECK(known.rejected.size() == 1);
   for (const DeviceProfile& profile : known.profiles) CHECK(profile.name != "falcon");
 }
 
-TEST_CASE("where there are no profiles none are known", "[known_profiles]") {
+TEST_CASE("without profile files the list is empty", "[known_profiles]") {
   const TemporaryDirectory dir;
   const KnownProfiles known = known_profiles(SearchPath({dir.path(), "/nowhere"}));
   CHECK(known.profiles.empty());
-  CHECK(known.refused.empty());
+  CHECK(known.rejected.empty());
 }
 
 }  // namespace

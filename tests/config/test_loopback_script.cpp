@@ -11,7 +11,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 
-/// wrenchd with a script, in virtual time.
+/// Runs wrenchd with a script in virtual time.
 ProgramResult run_script(const TemporaryDirectory& dir, const std::string& script,
                          const std::string& seconds = "4", std::vector<std::string> more = {}) {
   const fs::path file = dir.write("script.toml", script);
@@ -25,7 +25,7 @@ bool says(const ProgramResult& result, const std::string& text) {
   return result.err.find(text) != std::string::npos;
 }
 
-TEST_CASE("a script is read whole, its commands by time", "[loopback_script]") {
+TEST_CASE("all commands of a script are read, sorted by time", "[loopback_script]") {
   const TemporaryDirectory dir;
   const LoopbackScript script = load_loopback_script(dir.write("s.toml", R"(
 [[fault]]
@@ -55,9 +55,9 @@ command = "arm"
   CHECK(script.commands[1].at == std::chrono::seconds(3));
 }
 
-TEST_CASE("a script that cannot be is refused with its place and the cure", "[loopback_script]") {
+TEST_CASE("an invalid script is rejected with location and remedy", "[loopback_script]") {
   const TemporaryDirectory dir;
-  const auto told = [&](const std::string& text) -> std::string {
+  const auto rejection = [&](const std::string& text) -> std::string {
     try {
       load_loopback_script(dir.write("s.toml", text));
     } catch (const ConfigError& error) {
@@ -66,18 +66,19 @@ TEST_CASE("a script that cannot be is refused with its place and the cure", "[lo
     return "nothing";
   };
   using Catch::Matchers::Contains;
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silense\"\n"),
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silense\"\n"),
              Contains("4:8") && Contains("silence"));
-  CHECK_THAT(told("[[fault]]\nat_s = -1\nfor_s = 1\nkind = \"silence\"\n"), Contains("2:8"));
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
+  CHECK_THAT(rejection("[[fault]]\nat_s = -1\nfor_s = 1\nkind = \"silence\"\n"), Contains("2:8"));
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
              Contains("5:9") && Contains("leave it out"));
-  CHECK_THAT(told("[[command]]\nat_s = 1\ncommand = \"jump\"\n"), Contains("3:11") && Contains("disarm"));
-  CHECK_THAT(told("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
-  CHECK_THAT(told("fault = 3\n"), Contains("[[fault]]"));
+  CHECK_THAT(rejection("[[command]]\nat_s = 1\ncommand = \"jump\"\n"),
+             Contains("3:11") && Contains("disarm"));
+  CHECK_THAT(rejection("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
+  CHECK_THAT(rejection("fault = 3\n"), Contains("[[fault]]"));
 }
 
-TEST_CASE("a moment of silence degrades the loop, which comes back; the run ends well", "[loopback_script]") {
+TEST_CASE("a short silence degrades the loop, which recovers; the exit code is 0", "[loopback_script]") {
   const TemporaryDirectory dir;
   const auto result = run_script(dir, "[[fault]]\nat_s = 3.0\nfor_s = 0.01\nkind = \"silence\"\n");
   INFO(result.err);
@@ -88,7 +89,7 @@ TEST_CASE("a moment of silence degrades the loop, which comes back; the run ends
   CHECK(result.err.find("state: active", degraded) != std::string::npos);
 }
 
-TEST_CASE("a latched fault stays until it is acknowledged, and is the exit code", "[loopback_script]") {
+TEST_CASE("a latched fault stays until its acknowledgement and sets the exit code", "[loopback_script]") {
   const TemporaryDirectory dir;
   const std::string fault = "[[fault]]\nat_s = 2.0\nfor_s = 0.1\nkind = \"drift\"\n";
   const auto left = run_script(dir, fault);
@@ -102,10 +103,11 @@ TEST_CASE("a latched fault stays until it is acknowledged, and is the exit code"
   const auto tested = seen.err.find("state: self-test", latched);
   CHECK(tested != std::string::npos);
   CHECK(seen.err.find("state: disarmed", tested) != std::string::npos);
-  CHECK(seen.err.find("state: waiting", tested) == std::string::npos);  // never armed again by itself
+  CHECK(seen.err.find("state: waiting", tested) ==
+        std::string::npos);  // it does not arm again without a request
 }
 
-TEST_CASE("a stop, a stall, a client that falls silent: each as it should end", "[loopback_script]") {
+TEST_CASE("a stop, a stall and a client without heartbeats each have their exit code", "[loopback_script]") {
   const TemporaryDirectory dir;
   CHECK(says(run_script(dir, "[[command]]\nat_s = 2.5\ncommand = \"stop\"\n"), "state: stopped"));
   const auto stalled = run_script(dir, "[[fault]]\nat_s = 2.5\nfor_s = 0.009\nkind = \"stall\"\n");
@@ -123,7 +125,7 @@ TEST_CASE("a stop, a stall, a client that falls silent: each as it should end", 
   CHECK(alone.exit_code == 0);
 }
 
-TEST_CASE("a script is for simulated devices that can do what it says", "[loopback_script]") {
+TEST_CASE("a script requires a simulated device that supports its faults", "[loopback_script]") {
   const TemporaryDirectory dir;
   const fs::path file = dir.write("s.toml", "[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"drift\"\n");
   const auto real =

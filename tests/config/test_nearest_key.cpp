@@ -38,7 +38,7 @@ TEST_CASE("a key name ends in its unit", "[nearest_key]") {
   CHECK(unit_of("_").empty());
 }
 
-TEST_CASE("a unit reads as people write it", "[nearest_key]") {
+TEST_CASE("a unit is printed in the usual notation", "[nearest_key]") {
   CHECK(readable_unit("Hz") == "Hz");
   CHECK(readable_unit("N_s_per_m") == "N.s/m");
   CHECK(readable_unit("Nm_per_rad_s") == "N.m/rad/s");
@@ -47,7 +47,7 @@ TEST_CASE("a unit reads as people write it", "[nearest_key]") {
   CHECK(readable_unit("").empty());
 }
 
-TEST_CASE("a known quantity in another unit is told its unit", "[nearest_key]") {
+TEST_CASE("a known quantity in another unit is rejected with the correct unit", "[nearest_key]") {
   CHECK(advice("max_force_mN") == "give it in N as 'max_force_N'");
   CHECK(advice("rate_kHz") == "give it in Hz as 'rate_Hz'");
   CHECK(advice("position_mm") == "give it in m as 'position_m'");
@@ -57,13 +57,13 @@ TEST_CASE("a known quantity in another unit is told its unit", "[nearest_key]") 
   CHECK(advice("viscous_friction_N_s_per_mm") == "give it in N.s/m as 'viscous_friction_N_s_per_m'");
 }
 
-TEST_CASE("a slip of the keyboard is told the nearest key", "[nearest_key]") {
+TEST_CASE("a misspelt key is rejected with the nearest key", "[nearest_key]") {
   CHECK(advice("rate_hz") == "did you mean 'rate_Hz'?");
   CHECK(advice("plane") == "did you mean 'planes'?");
   CHECK(advice("max_forc_N") == "did you mean 'max_force_N'?");
 }
 
-TEST_CASE("what resembles nothing is told all there is", "[nearest_key]") {
+TEST_CASE("a key that resembles no other is rejected with the list of keys", "[nearest_key]") {
   CHECK(advice("bananas").find("known keys here: 'rate_Hz', 'max_force_N'") == 0);
   CHECK(advice(std::string(1'000'000, 'x')).find("known keys here: ") == 0);
   CHECK(nearest_key("bananas", {}).advice == "no key is known here");

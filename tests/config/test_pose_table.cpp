@@ -17,7 +17,7 @@ std::vector<Pose> poses(const std::string& text) {
   return read_poses(in, "p.csv");
 }
 
-/// What the table is refused with; empty when it is read.
+/// Returns the message with which the table is rejected; empty if it is read.
 std::string rejection_text(const std::string& text) {
   try {
     poses(text);
@@ -32,7 +32,7 @@ void check_pose(const Pose& X, const Vector3d& p, const Quaterniond& q) {
   CHECK((X.rotation.coeffs() - q.coeffs()).norm() < 1e-15);
 }
 
-TEST_CASE("a table gives its poses in their order, the quaternion's scalar last") {
+TEST_CASE("a table returns its poses in file order, with the quaternion's scalar last") {
   const auto X = poses(kHeader + "1,2,3,0,0,0,1\n-0.5,0,1e-3,0.6,0,0,0.8\n0,0,0,0,0,-1,0\n");
   REQUIRE(X.size() == 3);
   check_pose(X[0], {1, 2, 3}, {1, 0, 0, 0});
@@ -40,7 +40,7 @@ TEST_CASE("a table gives its poses in their order, the quaternion's scalar last"
   check_pose(X[2], {0, 0, 0}, {0, 0, 0, -1});
 }
 
-TEST_CASE("a table may come from any spreadsheet") {
+TEST_CASE("formats of all common spreadsheets are read") {
   const std::string row = "1.5,-2,3e2,0,0,0,1\n";
   const std::vector<std::string> good = {
       kHeader + row,
@@ -49,7 +49,7 @@ TEST_CASE("a table may come from any spreadsheet") {
       "\xEF\xBB\xBF" + kHeader + row,                              // byte order mark
       "\n \n" + kHeader + "\n\t\n" + row + "\n\r\n",               // blank lines
       " px, py ,pz,qx,qy,qz,qw \n 1.5,\t-2 , 3e2,0 ,0,0, 1 \n",    // blanks
-      kHeader + "+1.5,-2.0e+0,3.E2,-0,0.0,.0,1.\n",                // ways to write a number
+      kHeader + "+1.5,-2.0e+0,3.E2,-0,0.0,.0,1.\n",                // notations of a number
       kHeader + "1.5,-2,300.00000000000000000000000000,0,0,0,1\n"  // more digits than a double has
   };
   for (const std::string& text : good) {
@@ -61,11 +61,11 @@ TEST_CASE("a table may come from any spreadsheet") {
   }
 }
 
-TEST_CASE("a table without poses is a table") {
+TEST_CASE("a table without poses is valid") {
   CHECK(poses(kHeader).empty());
 }
 
-TEST_CASE("a quaternion is made unit when it nearly is") {
+TEST_CASE("a quaternion of nearly unit norm is normalized") {
   const auto X = poses(kHeader + "0,0,0,0,0,0.707,0.707\n");
   REQUIRE(X.size() == 1);
   CHECK(X[0].rotation.norm() == Approx(1.0).epsilon(1e-15));
@@ -93,7 +93,7 @@ TEST_CASE("numbers have a decimal point in every locale") {
   CHECK(message.find("p.csv:2:1: expected 7 numbers") == 0);
 }
 
-TEST_CASE("a bad table is refused at its line and column, with the cure") {
+TEST_CASE("an invalid table is rejected with line, column and remedy") {
   const std::vector<std::pair<std::string, std::string>> bad = {
       {"", "p.csv:1:1: is empty; expected the header 'px,py,pz,qx,qy,qz,qw'"},
       {"\n\n", "p.csv:1:1: is empty; expected the header 'px,py,pz,qx,qy,qz,qw'"},
@@ -143,7 +143,7 @@ TEST_CASE("a bad table is refused at its line and column, with the cure") {
   }
 }
 
-TEST_CASE("poses with times come back as counted from the first", "[playback]") {
+TEST_CASE("times of poses are returned relative to the first", "[playback]") {
   std::istringstream in(
       "time_s,px,py,pz,qx,qy,qz,qw\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,1,0\n");
   CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a rotation of 3.14"));
@@ -160,7 +160,7 @@ TEST_CASE("poses with times come back as counted from the first", "[playback]") 
   CHECK(poses[2].X.translation_m.x() == 0.02);
 }
 
-TEST_CASE("what a hand cannot do, and what is no table of times, is refused with its line", "[playback]") {
+TEST_CASE("implausible hand motions and tables without times are rejected with the line", "[playback]") {
   const std::string header = "time_s,px,py,pz,qx,qy,qz,qw\n", first = "0,0,0,0,0,0,0,1\n";
   const std::vector<std::pair<std::string, std::string>> bad = {
       {"", "t.csv:1:1: is empty; expected the header 'time_s,px"},
@@ -190,7 +190,7 @@ TEST_CASE("what a hand cannot do, and what is no table of times, is refused with
   }
 }
 
-TEST_CASE("all that is wrong is told at once, up to ten lines of it") {
+TEST_CASE("all defects are reported together, up to ten lines") {
   CHECK(rejection_text(kHeader + "x,2,3,0,0,0,y\n1,2,3,0,0,0,1\n1,2\n") ==
         "p.csv:2:1: px must be a finite number, found 'x'\n"
         "p.csv:2:13: qw must be a finite number, found 'y'\n"
@@ -204,7 +204,7 @@ TEST_CASE("all that is wrong is told at once, up to ten lines of it") {
   CHECK(message.find("\nand 15 more") != std::string::npos);
 }
 
-TEST_CASE("a message repeats no more than a glance of a bad file") {
+TEST_CASE("a message quotes only a short part of an invalid file") {
   CHECK(rejection_text(std::string(100000, 'x')).size() < 300);
   CHECK(rejection_text(kHeader + std::string(100000, 'x') + ",2,3,0,0,0,1\n").size() < 300);
 }

@@ -50,7 +50,7 @@ std::vector<DeviceProfile> all_shipped() {
 
 }  // namespace
 
-TEST_CASE("every shipped profile loads, has the name of its file, and reports that work", "[profiles]") {
+TEST_CASE("every shipped profile loads, has the name of its file, and has usable reports", "[profiles]") {
   const auto profiles = all_shipped();
   CHECK(profiles.size() == 10);
   for (const DeviceProfile& p : profiles) {
@@ -66,7 +66,7 @@ TEST_CASE("every shipped profile loads, has the name of its file, and reports th
   }
 }
 
-TEST_CASE("no id belongs to two shipped profiles that are used unnamed", "[profiles]") {
+TEST_CASE("no id belongs to two shipped profiles that are selected automatically", "[profiles]") {
   std::set<std::pair<std::uint16_t, std::uint16_t>> seen;
   for (const DeviceProfile& p : all_shipped()) {
     if (p.match.only_when_named) continue;
@@ -93,7 +93,8 @@ TEST_CASE("each shipped profile senses and drives what its device does", "[profi
   CHECK(dofs("falcon") == Pair("x y z", "x y z"));
 }
 
-TEST_CASE("the reference profiles speak the loopback's bytes at both speeds", "[profiles]") {
+TEST_CASE("the reference profiles have the report format of the loopback device at both speeds",
+          "[profiles]") {
   for (const char* name : {"reference_full_speed", "reference_high_speed"}) {
     const DeviceProfile p =
         load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml", kShipped);
@@ -103,7 +104,7 @@ TEST_CASE("the reference profiles speak the loopback's bytes at both speeds", "[
   }
 }
 
-TEST_CASE("the example's other devices are good profiles as well", "[profiles]") {
+TEST_CASE("the other devices in the example are valid profiles", "[profiles]") {
   std::ifstream example(WRENCHD_SOURCE_DIR "/config/profiles/example.toml");
   std::vector<std::string> blocks;
   for (std::string line; std::getline(example, line);) {
@@ -155,7 +156,7 @@ TEST_CASE("the shipped loopback profile is the reference report layout", "[profi
   CHECK(file.watchdog_s == code.watchdog_s);
 }
 
-TEST_CASE("a profile may state more limits, and what its buttons mean", "[profiles]") {
+TEST_CASE("a profile may state additional limits and the meaning of its buttons", "[profiles]") {
   const auto load = [](const std::string& name) {
     return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
   };
@@ -204,7 +205,7 @@ TEST_CASE("the shipped hands stay inside the loopback's workspace", "[profiles]"
   CHECK(hands > 0);
 }
 
-TEST_CASE("an inherited limit may be taken back, and a lower maximum lowers the rating", "[profiles]") {
+TEST_CASE("an inherited limit may be removed, and a lower maximum lowers the rating", "[profiles]") {
   const test::TemporaryDirectory dir;
   const auto load = [&](const std::string& parent, const std::string& text) {
     return load_profile(dir.write("mine.toml", "inherits = \"" + parent + "\"\nname = \"mine\"\n" + text),
@@ -242,9 +243,8 @@ TEST_CASE("a deadman or stop button may come in any report, as a bit, from a lis
   CHECK(highest.stop_button == 7);
 }
 
-TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is ever not finite",
-          "[profiles]") {
-  /// A link that gives out random bytes, and good reports with some bytes changed.
+TEST_CASE("a million fuzzed reports are decoded or rejected, and every sample is finite", "[profiles]") {
+  /// A link that returns random bytes, and valid reports with some bytes changed.
   class Noise final : public ReportLink {
    public:
     explicit Noise(const DeviceProfile& profile) : profile_(profile) {}
@@ -296,7 +296,7 @@ TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is 
   CHECK(profiles.size() * kReports >= 1'000'000);
 }
 
-TEST_CASE("a firmware is for what has a serial chip to load it through", "[profiles]") {
+TEST_CASE("a firmware requires a serial chip that loads it", "[profiles]") {
   const test::TemporaryDirectory dir;
   const auto load = [&](const std::string& endpoints) {
     return load_profile(

@@ -9,7 +9,7 @@ namespace wrenchd {
 
 using test::TemporaryDirectory;
 
-TEST_CASE("the first directory that has the file wins", "[search_path]") {
+TEST_CASE("the first directory that has the file is used", "[search_path]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path() / "etc", dir.path() / "usr"});
   const auto package = dir.write("usr/scenes/a.toml", "");
@@ -18,7 +18,7 @@ TEST_CASE("the first directory that has the file wins", "[search_path]") {
   CHECK(search.find("scenes/a.toml") == administrator);
 }
 
-TEST_CASE("a name inside a file is looked for beside that file first", "[search_path]") {
+TEST_CASE("a name inside a file is searched beside that file first", "[search_path]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path() / "etc"});
   dir.write("etc/a.toml", "");
@@ -27,7 +27,7 @@ TEST_CASE("a name inside a file is looked for beside that file first", "[search_
   CHECK(search.find("a.toml", dir.path() / "elsewhere/wrenchd.toml") == dir.path() / "etc/a.toml");
 }
 
-TEST_CASE("an absolute name is that file and no other", "[search_path]") {
+TEST_CASE("an absolute name selects that file only", "[search_path]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path() / "etc"});
   dir.write("etc/a.toml", "");
@@ -35,7 +35,7 @@ TEST_CASE("an absolute name is that file and no other", "[search_path]") {
   CHECK(search.find(dir.path() / "etc/a.toml"));
 }
 
-TEST_CASE("what is not found lists every place looked at", "[search_path]") {
+TEST_CASE("a missing file is reported with all searched directories", "[search_path]") {
   const SearchPath search({"/nowhere/etc", "/nowhere/usr"});
   CHECK_THROWS_AS(search.require("wrenchd.toml"), ConfigError);
   CHECK_THROWS_WITH(
@@ -43,12 +43,12 @@ TEST_CASE("what is not found lists every place looked at", "[search_path]") {
       "wrenchd.toml: no such file; searched /nowhere/etc/wrenchd.toml, /nowhere/usr/wrenchd.toml");
 }
 
-TEST_CASE("wrenchd's own directories hold the shipped files", "[search_path]") {
+TEST_CASE("the default directories contain the shipped files", "[search_path]") {
   CHECK(SearchPath().find("wrenchd.toml"));
   CHECK(SearchPath().candidates("x").front() == "/etc/wrenchd/x");
 }
 
-TEST_CASE("a profile is named with or without its file", "[search_path]") {
+TEST_CASE("a profile is named with or without the extension of its file", "[search_path]") {
   CHECK(profile_file("loopback") == "profiles/loopback.toml");
   CHECK(profile_file("mine/device.toml") == "mine/device.toml");
 }

@@ -24,7 +24,8 @@ bool is_section(std::string_view name) {
   return false;
 }
 
-/// "wrench.stiffness" for each key of a file. A table that is no section of the setting table is a value.
+/// Returns "wrench.stiffness" for each key of a file. A table that is not a section of the setting table is a
+/// value.
 void collect(const TomlNode& node, const std::string& before, std::set<std::string>& names) {
   for (const TomlEntry& entry : std::get<TomlNode::Table>(node.value)) {
     const std::string name = before + entry.key;
@@ -73,7 +74,7 @@ TEST_CASE("each number of the configuration reaches its member", "[settings]") {
   for (const Setting& setting : setting_table()) {
     if (setting.number == nullptr || setting.section == "rendering.friction") continue;
     INFO(setting.name());
-    // A nearby value that is in range: whole numbers stay whole.
+    // A nearby value in the range; integers stay integers.
     const double old = setting.number(defaults);
     bool reached = false;
     for (const double value : {old + 1.0, old - 1.0, 1.01 * old, 0.99 * old, 0.5}) {

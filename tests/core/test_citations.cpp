@@ -14,8 +14,8 @@
 
 #include <catch2/catch.hpp>
 
-// Citations in the tree lead somewhere: METHOD (22) and sections of core/METHOD.md, Eq. (8) and sections of
-// the paper, names of Markdown files, links of the guides.
+// Checks the citations of the tree: METHOD (22) and sections of core/METHOD.md, Eq. (8) and sections of the
+// paper, names of Markdown files, links of the guides.
 
 namespace {
 
@@ -33,7 +33,7 @@ std::string name_of(const fs::path& file) {
   return fs::relative(file, kSource).generic_string();
 }
 
-/// The text files of the tree that people write.
+/// Returns the text files of the tree without generated files.
 std::vector<fs::path> sources() {
   static const std::set<std::string> kinds = {".hpp", ".cpp", ".in",   ".md",  ".toml", ".py", ".txt",
                                               ".mjs", ".js",  ".html", ".css", ".gp",   ""};
@@ -50,8 +50,8 @@ std::vector<fs::path> sources() {
   return files;
 }
 
-/// A text in one line, without comment marks and without the quotes between the parts of a string literal, so
-/// that a citation may continue on the next line.
+/// Returns a text as one line, without comment marks and without the quotes between parts of a string
+/// literal. So a citation may continue on the next line.
 class Text {
  public:
   explicit Text(std::string_view text) {
@@ -103,7 +103,7 @@ struct Markdown {
 
 using Numbers = std::set<std::string>;
 
-/// What core/METHOD.md has: its sections, its equations, and the equations of the paper that it lists.
+/// Content of core/METHOD.md: its sections, its equations, and the equations of the paper that it lists.
 struct Method {
   Numbers sections, equations, of_paper;
   std::vector<std::string> in_order;  ///< equations
@@ -212,7 +212,7 @@ class CitationCheck {
     if (numbers.empty() || of_standard) return;
     const bool of_paper = preceded_by(at, "paper, "), of_method = preceded_by(at, R"(METHOD\.md\)?, )");
     for (const std::string& n : numbers) {
-      if (std::count(n.begin(), n.end(), '.') > 1) continue;  // of a standard: neither document is that deep
+      if (std::count(n.begin(), n.end(), '.') > 1) continue;  // a section of a standard
       if (of_paper && !kPaperSections.contains(n)) report(at, "the paper has no section " + n);
       if (of_paper) continue;
       if (!of_method && !in_method_)
@@ -262,7 +262,7 @@ std::set<std::string> anchors_of(const fs::path& file) {
 
 }  // namespace
 
-TEST_CASE("each citation of the method and of the paper leads somewhere", "[citations]") {
+TEST_CASE("every citation of the method and of the paper has a target", "[citations]") {
   REQUIRE(sources().size() > 300);
   for (const fs::path& file : sources()) {
     const std::string name = name_of(file);
@@ -272,7 +272,7 @@ TEST_CASE("each citation of the method and of the paper leads somewhere", "[cita
   }
 }
 
-TEST_CASE("right citations pass, wrong ones are found", "[citations]") {
+TEST_CASE("valid citations pass, invalid citations are reported", "[citations]") {
   for (const char* right :
        {"METHOD (22), core/METHOD.md, section 3.4, Eqs. (26)-(30) and paper, sections 3.2 to 3.4",
         "/// METHOD (24)-(26), METHOD (9), Eq. (8), core/METHOD.md,\n/// section 5",
@@ -292,7 +292,7 @@ TEST_CASE("right citations pass, wrong ones are found", "[citations]") {
   }
 }
 
-TEST_CASE("the equations of the method have one number each and rise", "[citations]") {
+TEST_CASE("the equation numbers of the method are unique and ascending", "[citations]") {
   CHECK(method().sections.size() > 50);
   const auto less = [](const std::string& a, const std::string& b) {
     return std::pair(std::stoi(a), a) < std::pair(std::stoi(b), b);
@@ -333,7 +333,7 @@ TEST_CASE("each Markdown file that is named exists", "[citations]") {
   static const std::regex name(R"([\w./-]*\w\.md\b)");
   for (const fs::path& file : sources()) {
     const std::string where = name_of(file);
-    if (where == "tests/test_guides" || where == kThisFile) continue;  // they name what is not there
+    if (where == "tests/test_guides" || where == kThisFile) continue;  // they name missing files on purpose
     const std::string text = read(file);
     for (std::sregex_iterator i(text.begin(), text.end(), name), end; i != end; ++i) {
       std::string named = (*i)[0];

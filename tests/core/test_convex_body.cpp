@@ -20,7 +20,7 @@ TEST_CASE("a box has six faces, twelve edges and no diagonal", "[convex_body]") 
   for (std::uint32_t v = 0; v < 8; ++v) CHECK(body.faces_of(v).size() == 3);
 }
 
-TEST_CASE("each vertex knows the edges that end there", "[convex_body]") {
+TEST_CASE("each vertex lists the edges that end at it", "[convex_body]") {
   RandomValues random(5);
   const ConvexBody body = random_body(random, 30).hull;
   std::size_t ends = 0;
@@ -45,7 +45,7 @@ TEST_CASE("the support is the farthest vertex", "[convex_body]") {
   }
 }
 
-TEST_CASE("so it is where there are many vertices, and their faces bound the body too", "[convex_body]") {
+TEST_CASE("support and faces are also correct for a body with many vertices", "[convex_body]") {
   RandomValues random(4);
   const ConvexBody body = convex_hull(make_mesh({"sphere", 20000}).vertices_m);
   REQUIRE(body.vertices_T_m.size() > 8000);

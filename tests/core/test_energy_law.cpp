@@ -39,7 +39,7 @@ struct Loop {
   }
 };
 
-/// Both laws at one point of a loop: what they do a unit of t, and how far they are pulled.
+/// Both laws at one point of a loop: power per unit of t, and displacement.
 struct Rate {
   Pose X_WQ;
   double energy_law, pid;
@@ -78,9 +78,9 @@ class Follower {
 };
 
 struct Work {
-  double energy_law = 0.0;  ///< around the loop, in units of the greatest potential on it
-  double pid = 0.0;         ///< the same of K_P = k_P I, in units of its greatest k_P |eps|^2 / 2
-  bool smooth = true;       ///< q never jumped, and never left the wall
+  double energy_law = 0.0;  ///< work around the loop, divided by the largest potential on it
+  double pid = 0.0;         ///< work of K_P = k_P I around the loop, divided by its largest k_P |eps|^2 / 2
+  bool smooth = true;       ///< true if q is continuous and stays in contact
 };
 
 bool far_apart(const Pose& a, const Pose& b, double most) {
@@ -145,7 +145,7 @@ TEST_CASE("the energy wrench is minus the gradient of the potential at fixed q",
   }
 }
 
-TEST_CASE("and it is so with q where the projection puts it", "[energy_law]") {
+TEST_CASE("the energy wrench is also minus the gradient if q is the projection of p", "[energy_law]") {
   RandomValues random(2);
   for (int i = 0; i < 60; ++i) {
     const OverlappingScene c = overlap_corner(random, 1, random.uniform(0.05, 0.15));
@@ -178,7 +178,7 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
     const OverlappingScene c = overlap_corner(random, random.integer(1, 2), random.uniform(0.1, 0.2));
     const Loop loop{c.X_WP, 0.05 * random.unit<6>(), 0.05 * random.unit<6>(), 0.02 * random.unit<6>()};
     const Work work = around(loop, c.scene);
-    if (!work.smooth) {  // q went over to another minimum, or the hand left the wall: not a closed path of U
+    if (!work.smooth) {  // q changed to another minimum, or the contact ended: not a closed path of U
       REQUIRE(++jumped < kLoops);
       continue;
     }
@@ -190,5 +190,5 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
                       << ", Eq. (16) with k_P alone at most " << worst_pid << "; " << jumped
                       << " loops drawn again because q jumped");
   CHECK(worst < 1e-6);
-  CHECK(worst_pid > 1e-3);  // or the comparison compares nothing
+  CHECK(worst_pid > 1e-3);  // otherwise the comparison is empty
 }

@@ -8,7 +8,7 @@
 
 using namespace wrenchd;
 
-TEST_CASE("every fault has a name of its own, a detector, a sentence, a reason and a cure", "[fault]") {
+TEST_CASE("every fault has a unique name, a detector, a message, a reason and a remedy", "[fault]") {
   std::set<std::string> names, sentences;
   CHECK(fault_rows().size() == kFaultCount - 1);
   for (const FaultRow& row : fault_rows()) {
@@ -26,7 +26,8 @@ TEST_CASE("every fault has a name of its own, a detector, a sentence, a reason a
   CHECK(sentences.size() == kFaultCount - 1);
 }
 
-TEST_CASE("what latches takes the force at once, and its cure names the acknowledgement", "[fault]") {
+TEST_CASE("latching faults remove the force immediately, and their remedy names the acknowledgement",
+          "[fault]") {
   for (const FaultRow& row : fault_rows()) {
     INFO(row.name);
     const bool latches = row.trigger == Trigger::hard_fault || row.trigger == Trigger::self_test_failed ||
@@ -38,7 +39,7 @@ TEST_CASE("what latches takes the force at once, and its cure names the acknowle
   }
 }
 
-TEST_CASE("names that stand in records", "[fault]") {
+TEST_CASE("fault names in records", "[fault]") {
   CHECK(fault_row(Fault::none).name == "none");
   CHECK(fault_row(Fault::device_lost).name == "device_lost");
   CHECK(fault_row(Fault::pose_not_finite).name == "pose_not_finite");
@@ -46,7 +47,7 @@ TEST_CASE("names that stand in records", "[fault]") {
   CHECK(fault_row(Fault::self_test_watchdog).name == "self_test_watchdog");
 }
 
-TEST_CASE("a value that is no fault reads unknown", "[fault]") {
+TEST_CASE("an invalid fault value is named unknown", "[fault]") {
   for (std::size_t value = kFaultCount; value < 256; ++value) {
     const FaultRow& row = fault_row(static_cast<Fault>(value));
     REQUIRE(row.name == "unknown");

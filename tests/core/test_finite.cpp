@@ -22,8 +22,8 @@ double from_bits(std::uint64_t bits) {
   return std::bit_cast<double>(bits);
 }
 
-/// One of each class of bit pattern that is no number: infinities, quiet and signalling NaN, payloads, both
-/// signs.
+/// One bit pattern of each class that is not a finite number: infinities, quiet and signalling NaN, payloads,
+/// both signs.
 const std::vector<double> kNotFiniteValues = {
     from_bits(kExponent),
     from_bits(kSign | kExponent),
@@ -38,7 +38,7 @@ const std::vector<double> kNotFiniteValues = {
 
 }  // namespace
 
-TEST_CASE("infinities and NaNs of every kind are not finite", "[finite]") {
+TEST_CASE("all infinities and NaNs are not finite", "[finite]") {
   for (const double x : kNotFiniteValues) CHECK_FALSE(is_finite(x));
 }
 
@@ -50,7 +50,7 @@ TEST_CASE("zeros, denormals and the extremes are finite", "[finite]") {
   }
 }
 
-TEST_CASE("any bit pattern: finite where the standard library says so", "[finite]") {
+TEST_CASE("for any bit pattern is_finite() agrees with std::isfinite", "[finite]") {
   RandomValues random(1);
   for (int i = 0; i < 200'000; ++i) {
     const std::uint64_t bits = random.bits() | (random.chance(0.5) ? kExponent : 0);
@@ -58,7 +58,7 @@ TEST_CASE("any bit pattern: finite where the standard library says so", "[finite
   }
 }
 
-TEST_CASE("one slot that is not finite and the whole is not", "[finite]") {
+TEST_CASE("a vector with one component that is not finite is not finite", "[finite]") {
   CHECK(is_finite(Vector3d(1.0, 2.0, 3.0)));
   CHECK(is_finite(Quaterniond::Identity()));
   CHECK(is_finite(Pose{}));

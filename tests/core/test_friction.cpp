@@ -23,11 +23,11 @@ namespace {
 using namespace test;
 
 constexpr double kHalf_m = 0.025;  ///< half a side of the cube
-constexpr double kDepth_m = 1e-3;  ///< that the hand presses it by
+constexpr double kDepth_m = 1e-3;  ///< depth by which the hand presses the cube
 
 enum class Ground { half_space, convex, mesh };
 
-/// The cube over a ground whose top is at z = 0; for the mesh at that of the table.
+/// The cube over an obstacle with its top at z = 0; the mesh is a table.
 double top_m(Ground ground) {
   return ground == Ground::mesh ? 0.01 : 0.0;
 }
@@ -47,7 +47,7 @@ Scene cube_on(Ground ground, std::size_t triangles = 12) {
   return Scene(mesh_tool(cube), {}, {}, std::move(obstacles));
 }
 
-/// A proxy with friction, from a start in the air.
+/// A proxy with friction that starts without contact.
 struct Rubbed {
   Rubbed(Scene scene_, const FrictionSettings& friction, const Pose& X_start)
       : scene(std::move(scene_)),
@@ -72,7 +72,7 @@ Pose upright(double x_m, double y_m, double z_m) {
   return {Quaterniond::Identity(), {x_m, y_m, z_m}};
 }
 
-/// The cube set down on the ground, with the hand kDepth_m below.
+/// The cube on the obstacle, with the hand kDepth_m below it.
 struct SetDown : Rubbed {
   SetDown(Ground ground, const FrictionSettings& friction, std::size_t triangles = 12)
       : Rubbed(cube_on(ground, triangles), friction, upright(0.01, 0.02, top_m(ground) + kHalf_m + 2e-4)),
@@ -80,13 +80,13 @@ struct SetDown : Rubbed {
     for (const double down : {0.0, 0.5, 1.0})
       follow(upright(0.01, 0.02, z_m + (1.0 - down) * (kDepth_m + 1e-4)));
   }
-  /// The hand at so much from where it came down.
+  /// Returns the hand pose at a displacement from the first contact.
   Pose at(double x_m, double y_m = 0.0) const { return upright(0.01 + x_m, 0.02 + y_m, z_m); }
 
   double z_m;
 };
 
-TEST_CASE("sliding takes mu times the force that presses, on every kind of ground", "[friction]") {
+TEST_CASE("sliding friction is mu times the normal force, on every kind of obstacle", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   for (const double mu : {0.1, 0.6, 1.5}) {
     SetDown s(ground, {mu, mu});
@@ -100,9 +100,9 @@ TEST_CASE("sliding takes mu times the force that presses, on every kind of groun
       REQUIRE(p.contacts >= 3);
       const Wrench F = s.wrench(X_WP);
       const Vector3d along = F.force_N - F.force_N.z() * Vector3d::UnitZ();
-      // To 1e-6: a nanometre of clearance on a millimetre.
+      // Tolerance 1e-6: 1 nm of clearance at a depth of 1 mm.
       const double most = mu * F.force_N.z();
-      const double held = 1e4 * 0.1 * 5e-5 * tick;  // by a tool that has not moved
+      const double held = 1e4 * 0.1 * 5e-5 * tick;  // expected while the tool sticks
       REQUIRE(along.dot(-way) == Approx(std::min(most, held)).epsilon(2e-6));
       REQUIRE(along.cross(way).norm() < 1e-9 * most);
       REQUIRE(F.force_N.z() == Approx(1e4 * 0.1 * kDepth_m).epsilon(2e-6));
@@ -113,7 +113,7 @@ TEST_CASE("sliding takes mu times the force that presses, on every kind of groun
   }
 }
 
-TEST_CASE("a tool that sticks stays where it is to the bit", "[friction]") {
+TEST_CASE("a sticking tool keeps its pose bit for bit", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
   SetDown s(ground, {0.8, 0.8});
@@ -129,14 +129,14 @@ TEST_CASE("a tool that sticks stays where it is to the bit", "[friction]") {
     REQUIRE(p.projection.status == ProjectionStatus::converged);
     REQUIRE(p.contacts >= 3);
   }
-  // Lifted by the hand it is let go at once.
+  // When the hand lifts the tool, friction ends at once.
   Pose X_WP = s.at(2e-4);
   X_WP.translation_m.z() += kDepth_m + 1e-5;
   CHECK(s.follow(X_WP).contacts == 0);
   CHECK((s.X_WQ.translation_m - X_WP.translation_m).norm() < 1e-12);
 }
 
-TEST_CASE("what has stuck for a while slides off at the static coefficient, and on at the dynamic one",
+TEST_CASE("a tool at rest starts to slide at the static and continues at the dynamic coefficient",
           "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
@@ -155,13 +155,13 @@ TEST_CASE("what has stuck for a while slides off at the static coefficient, and 
   }
   CHECK(largest > 0.78);
   CHECK(largest < 0.801);
-  // An encoder of 10 um lets the hand stand still in nine of ten ticks, and is not noticed.
+  // With an encoder step of 10 um the hand is at rest in nine of ten ticks, which must not cause sticking.
   for (int tick = 0; tick < 200; ++tick) {
     const Pose X_WP = s.at(x_m + 1e-5 * (tick / 10));
     s.follow(X_WP);
     REQUIRE(lag(X_WP) == Approx(0.5).epsilon(1e-5));
   }
-  // At rest it holds again.
+  // At rest static friction applies again.
   x_m += 2e-4;
   for (int tick = 0; tick < 30; ++tick) s.follow(s.at(x_m));
   s.follow(s.at(x_m + 0.25 * kDepth_m));
@@ -174,7 +174,7 @@ TEST_CASE("a tool that slides does not chatter", "[friction]") {
   SetDown s(ground, {0.7, 0.5});
   Vector6d last[2];
   double jolt = 0.0, largest = 0.0;
-  for (int tick = 0; tick < 2000; ++tick) {  // in a circle of 20 mm, once a second, pressed and let up
+  for (int tick = 0; tick < 2000; ++tick) {  // a circle of 20 mm per second with varying depth
     const double t = 1e-3 * tick;
     Pose X_WP = s.at(0.02 * std::sin(2.0 * std::numbers::pi * t),
                      0.02 * (1.0 - std::cos(2.0 * std::numbers::pi * t)));
@@ -189,10 +189,10 @@ TEST_CASE("a tool that slides does not chatter", "[friction]") {
     last[0] = now;
   }
   CHECK(largest > 1.0);
-  CHECK(jolt < 2e-4 * largest);  // (2 pi / 1000)^2 = 4e-5 of it is the circle
+  CHECK(jolt < 2e-4 * largest);  // the circle itself contributes (2 pi / 1000)^2 = 4e-5
 }
 
-TEST_CASE("where the hand stands still the tool comes to rest, and stays", "[friction]") {
+TEST_CASE("when the hand stops, the tool comes to rest", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   RandomValues random(4);
   for (int n = 0; n < 10; ++n) {
@@ -215,7 +215,7 @@ TEST_CASE("where the hand stands still the tool comes to rest, and stays", "[fri
   }
 }
 
-TEST_CASE("a cube does not turn on its face until the hand twists harder than all corners rub",
+TEST_CASE("a cube on its face rotates only if the torque exceeds the friction of all its corners",
           "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
@@ -228,20 +228,20 @@ TEST_CASE("a cube does not turn on its face until the hand twists harder than al
     X_WP.rotation = rotation_from({0.0, 0.0, 2e-4 * tick});
     s.follow(X_WP);
     const Wrench F = s.wrench(X_WP);
-    // The corners carry, and all of them are as far from the middle.
+    // The corners carry the load, all at the same distance from the middle.
     const double most = mu * F.force_N.z() * kHalf_m * std::sqrt(2.0);
     const double held = 1e4 * s.scene.tool().solid.inertia.H_kg_m2(2, 2) * 2e-4 * tick;
     INFO("tick " << tick);
     slides = slides || held > most;
     if (!slides) REQUIRE(same_bits(s.X_WQ, X_stuck));
-    // To the square of the angle, by which a turn and a straight line differ.
+    // Tolerance: the square of the angle, the difference of a rotation and a line.
     REQUIRE(-F.torque_Nm.z() == Approx(std::min(held, most)).epsilon(5e-3).margin(1e-12));
     REQUIRE((s.X_WQ.translation_m - X_stuck.translation_m).norm() < 1e-9);
   }
   CHECK(slides);
 }
 
-/// A tool that stands on its tip: a pyramid upside down, of 50 mm.
+/// A tool on its tip: an inverted pyramid of 50 mm.
 Rubbed on_tip(const FrictionSettings& friction) {
   std::vector<Vector3d> points = {{0, 0, 0}};
   for (const double x : {-0.02, 0.02})
@@ -250,14 +250,14 @@ Rubbed on_tip(const FrictionSettings& friction) {
                 upright(0, 0, 0.04));
 }
 
-TEST_CASE("a tip holds against sliding, and neither against spinning nor against tilting", "[friction]") {
+TEST_CASE("friction at a tip resists sliding, but neither spinning nor tilting", "[friction]") {
   Rubbed s = on_tip({0.9, 0.9});
-  const double height_m = s.scene.tool().solid.p_MT_m.z();  // of the centre of mass over the tip
+  const double height_m = s.scene.tool().solid.p_MT_m.z();  // height of the centre of mass above the tip
   const auto tip = [&](const Pose& X) { return X * Vector3d(0, 0, -height_m); };
   for (const double z : {1e-4, -1e-3, -1e-3}) s.follow(upright(0, 0, height_m + z));
   const Vector3d tip_stuck = tip(s.X_WQ);
   Pose X_WP;
-  for (int tick = 0; tick < 1000; ++tick) {  // spun, tilted, and drawn to the side
+  for (int tick = 0; tick < 1000; ++tick) {  // spinning, tilting and sliding
     const double t = 1e-3 * tick;
     X_WP.rotation =
         rotation_from({0.2 * std::sin(3.0 * t), 0.1 * std::sin(5.0 * t), 0.0}) * rotation_from({0, 0, t});
@@ -266,7 +266,7 @@ TEST_CASE("a tip holds against sliding, and neither against spinning nor against
     INFO("tick " << tick);
     REQUIRE((tip(s.X_WQ) - tip_stuck).norm() < 1e-8);
     REQUIRE(s.X_WQ.rotation.angularDistance(X_WP.rotation) < 0.02);
-    // What holds at the tip has no lever about it; to the curvature of the way of a tip that is pressed in.
+    // Friction at the tip has no lever about it, up to the curvature of the tip's path.
     const Vector3d tau =
         wrench_about(tip(s.X_WQ), X_WP, energy_wrench(s.scene.tool().solid.inertia, 1e4, X_WP, s.X_WQ))
             .torque_Nm;
@@ -274,9 +274,8 @@ TEST_CASE("a tip holds against sliding, and neither against spinning nor against
   }
 }
 
-TEST_CASE("where friction shifts the load, it is the load that is there which rubs", "[friction]") {
-  // A tip that leans forward or back: what holds it at the tip tilts it, and that lifts it or presses it
-  // down.
+TEST_CASE("friction uses the normal forces after it has shifted the load", "[friction]") {
+  // A tip that leans forward or back: friction at the tip tilts the tool, which changes the normal force.
   for (const double mu : {0.2, 0.5})
     for (const double tilt : {-0.4, 0.0, 0.4}) {
       Rubbed s = on_tip({mu, mu});
@@ -299,7 +298,7 @@ TEST_CASE("where friction shifts the load, it is the load that is there which ru
     }
 }
 
-TEST_CASE("a tool that comes through the air is not held back where it came from", "[friction]") {
+TEST_CASE("friction does not act on a tool before contact", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
   const double z_m = top_m(ground) + kHalf_m;
@@ -312,8 +311,8 @@ TEST_CASE("a tool that comes through the air is not held back where it came from
   CHECK(same_bits(s.X_WQ, smooth.X_WQ));
   const Pose X_on = upright(5e-3, 0, z_m - kDepth_m);
   s.follow(X_on);
-  CHECK(same_bits(s.X_WQ, smooth.X_WQ));  // and there it sticks
-  // Nor one that is put elsewhere, or whose history is forgotten.
+  CHECK(same_bits(s.X_WQ, smooth.X_WQ));  // the tool sticks there
+  // The same holds for a tool that is moved without history.
   s.depth.clear_history();
   s.follow(X_on);
   CHECK(s.X_WQ.translation_m.x() == Approx(5e-3).epsilon(1e-12));
@@ -322,19 +321,19 @@ TEST_CASE("a tool that comes through the air is not held back where it came from
   CHECK(s.X_WQ.translation_m.x() == Approx(5e-3).epsilon(1e-12));
 }
 
-TEST_CASE("a tool that slides into a wall comes to the wall, and rubs there", "[friction]") {
+TEST_CASE("a tool that slides into a wall reaches the wall and has friction at it", "[friction]") {
   const Scene scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1),
                     {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitX(), -0.03)});
   Rubbed s(scene, {0.5, 0.5}, upright(0, 0, kHalf_m + 1e-4));
   for (const double z : {0.0, -0.5e-3, -kDepth_m}) s.follow(upright(0, 0, kHalf_m + z));
   for (int tick = 1; tick <= 20; ++tick) s.follow(upright(5e-4 * tick, 0, kHalf_m - kDepth_m));
   CHECK(s.X_WQ.translation_m.x() == Approx(5e-3).margin(2e-9));
-  // Along both: the hand is 1 mm below the floor and 5 mm behind the wall.
+  // Contact with both: the hand is 1 mm below the floor and 5 mm behind the wall.
   for (int tick = 1; tick <= 200; ++tick) s.follow(upright(0.01, 1e-4 * tick, kHalf_m - kDepth_m));
   CHECK(0.02 - s.X_WQ.translation_m.y() == Approx(0.5 * (kDepth_m + 5e-3)).epsilon(1e-5));
 }
 
-TEST_CASE("a tilted cube is set down on its face though its edge sticks", "[friction]") {
+TEST_CASE("a tilted cube can be set down on its face while its edge sticks", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
   const double z_m = top_m(ground) + kHalf_m - kDepth_m;
@@ -347,7 +346,7 @@ TEST_CASE("a tilted cube is set down on its face though its edge sticks", "[fric
   CHECK(s.X_WQ.translation_m.z() == Approx(top_m(ground) + kHalf_m).margin(1e-8));
 }
 
-TEST_CASE("a cube on a table feels the same friction however both are cut", "[friction]") {
+TEST_CASE("the friction of a cube on a table does not depend on the triangulation", "[friction]") {
   const auto wrenches = [](std::size_t triangles) {
     Rubbed s(cube_on(Ground::mesh, triangles), {0.5, 0.3}, upright(0, 0, 0.0351));
     std::vector<Vector6d> out;
@@ -374,7 +373,7 @@ TEST_CASE("a cube on a table feels the same friction however both are cut", "[fr
   CHECK(difference < 1e-6 * largest);
 }
 
-TEST_CASE("a proxy that rubs overlaps nothing, whatever the hand does: exactly", "[friction][proxy]") {
+TEST_CASE("a proxy with friction never overlaps an obstacle, in exact arithmetic", "[friction][proxy]") {
   const auto i = GENERATE(range<std::size_t>(0, 20));
   const ManipulationCase& handling = manipulation_cases()[i];
   INFO(handling.name);
@@ -397,8 +396,8 @@ TEST_CASE("a proxy that rubs overlaps nothing, whatever the hand does: exactly",
   CAPTURE(stuck, spent);
 }
 
-TEST_CASE("a convex tool that rubs on convex bodies stays out of them", "[friction][convex]") {
-  RandomValues random(8);  // the 18th once came out 1.3 mm deep in the half-space
+TEST_CASE("a convex tool with friction never overlaps convex bodies", "[friction][convex]") {
+  RandomValues random(8);  // case 18 once overlapped the half-space by 1.3 mm
   int contacts = 0;
   const int runs = case_count(20);
   for (int n = 0; n < runs; ++n) {
@@ -453,14 +452,14 @@ TEST_CASE("friction neither allocates nor locks", "[realtime][friction]") {
   }
 }
 
-TEST_CASE("what is about to be touched does not hold", "[friction]") {
+TEST_CASE("a contact that closes in this tick has no friction", "[friction]") {
   const Scene scene = cube_on(Ground::half_space);
   PenetrationDepth depth(scene, {});
   const Pose X_last = upright(0, 0, kHalf_m), X_WP = upright(1e-4, 0, kHalf_m - kDepth_m);
   Projection touching = depth.follow(X_WP, X_last).projection;
   touching.X_WQ = X_last;
   Friction friction(scene.tool().solid.inertia, {0.5, 0.5}, 0.0);
-  CHECK(same_bits(friction.frictional_goal(X_WP, X_last), X_WP));  // nothing is known
+  CHECK(same_bits(friction.frictional_goal(X_WP, X_last), X_WP));  // without history
   friction.store_contacts(touching);
   friction.frictional_goal(X_WP, X_last);
   CHECK(friction.sticks());
@@ -471,7 +470,7 @@ TEST_CASE("what is about to be touched does not hold", "[friction]") {
   CHECK_FALSE(friction.sticks());
 }
 
-TEST_CASE("only method exact knows friction, and the others say so", "[friction]") {
+TEST_CASE("only method exact supports friction; the other methods reject it", "[friction]") {
   const Scene scene = cube_on(Ground::half_space);
   for (const Method method : {Method::planar, Method::descent, Method::translational})
     CHECK_THROWS_WITH(PenetrationDepth(scene, {method, 47, 0.0, {0.5, 0.3}}),

@@ -24,28 +24,28 @@ double power(const Wrench& F, const Twist& V) {
   return F.force_N.dot(V.linear_m_per_s) + F.torque_Nm.dot(V.angular_rad_per_s);
 }
 
-/// X moved for a time with a constant velocity of the handle point, in base axes.
+/// Returns X after a motion with constant velocity of the handle point, in base axes.
 Pose moved(const Pose& X, const Twist& V, double time_s) {
   return {(rotation_from(time_s * V.angular_rad_per_s) * X.rotation).normalized(),
           X.translation_m + time_s * V.linear_m_per_s};
 }
 
-TEST_CASE("a base on a level table: straight up, and a torque where the centre is beside the handle point",
+TEST_CASE("level base: the force points up, with a torque if the centre of mass is off the handle point",
           "[gravity]") {
   const GravityCompensation level({0.2, {0.0, 0.0, 0.05}, 0.1}, Quaterniond::Identity());
   const Wrench upright = level.wrench({});
   CHECK((upright.force_N - Vector3d(0, 0, 0.3 * g)).norm() < 1e-15);
-  CHECK(upright.torque_Nm.norm() < 1e-15);  // the centre stands above the handle point
+  CHECK(upright.torque_Nm.norm() < 1e-15);  // the centre of mass is above the handle point
 
-  // Tipped forward, about y: the centre is 5 cm ahead, and the device has to hold it up.
+  // Tilted forward about y: the centre of mass is 5 cm ahead, so a torque is required.
   const Pose tipped{Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitY())), {0.1, 0.2, 0.3}};
   const Wrench held = level.wrench(tipped);
   CHECK((held.force_N - Vector3d(0, 0, 0.3 * g)).norm() < 1e-15);
   CHECK((held.torque_Nm - Vector3d(0, -0.2 * g * 0.05, 0)).norm() < 1e-15);
 }
 
-TEST_CASE("a base on a wall: gravity is where the tilt says", "[gravity]") {
-  // B's x, forward, points up in the world.
+TEST_CASE("tilted base: the force follows the orientation of the base", "[gravity]") {
+  // The x axis of B points up in the world.
   const Quaterniond R_WB(Eigen::AngleAxisd(-std::numbers::pi / 2, Vector3d::UnitY()));
   CHECK((R_WB * Vector3d::UnitX() - Vector3d::UnitZ()).norm() < 1e-15);
   const GravityCompensation wall({0.2, Vector3d::Zero(), 0.0}, R_WB);
@@ -66,18 +66,18 @@ TEST_CASE("the wrench is the gradient of m g h", "[gravity]") {
                         gravity.potential_energy_J(moved(X_BH, V, -step_s));
     CHECK(power(gravity.wrench(X_BH), V) == Approx(rise / (2 * step_s)).margin(1e-8));
 
-    // And the energy is m g h of each mass, told in the world, whose z is up.
+    // The energy is m g h of each mass, in the world with z up.
     const double h_H = (R_WB * X_BH.translation_m).z(), h_C = (R_WB * (X_BH * masses.p_HHcm_m)).z();
     CHECK(gravity.potential_energy_J(X_BH) ==
           Approx(g * (masses.carried_kg * h_H + masses.handle_kg * h_C)).margin(1e-12));
   }
 }
 
-TEST_CASE("around a closed way it does no work", "[gravity]") {
+TEST_CASE("gravity compensation does no work around a closed path", "[gravity]") {
   RandomValues random(8);
   for (int way = 0; way < 20; ++way) {
     const GravityCompensation gravity(random_masses(random), random.rotation());
-    // Corners that lead back to the first, with turns in between; Simpson's rule on each leg.
+    // A closed polygon with rotations; Simpson's rule on each side.
     std::vector<Pose> corners;
     for (int i = 0; i < 5; ++i) corners.push_back(random.pose(0.2));
     corners.push_back(corners.front());
@@ -101,7 +101,7 @@ TEST_CASE("around a closed way it does no work", "[gravity]") {
 /// The handle as a free rigid body: gravity on its centre of mass, the motors at the handle point.
 struct FreeHandle {
   MovingMasses masses;
-  Inertia inertia;  ///< of the handle about C, isotropic, so that it stays the same when it turns
+  Inertia inertia;  ///< inertia of the handle about C; isotropic, so it does not depend on the rotation
   Quaterniond R_WB;
   Pose X_BH;
   Vector3d v_C = Vector3d::Zero();  ///< in B [m/s]
@@ -121,7 +121,7 @@ struct FreeHandle {
   }
 };
 
-TEST_CASE("a handle that would fall stays where it is put, and coasts when it is pushed", "[gravity]") {
+TEST_CASE("a compensated handle stays in place and coasts after a push", "[gravity]") {
   RandomValues random(9);
   constexpr double h = 1e-3;
   for (int i = 0; i < 20; ++i) {
@@ -146,13 +146,13 @@ TEST_CASE("a handle that would fall stays where it is put, and coasts when it is
     CHECK((handle.X_BH.translation_m - start.translation_m).norm() < 1e-9);
     CHECK(handle.X_BH.rotation.angularDistance(start.rotation) < 1e-9);
     CHECK(pushed.kinetic_J() == Approx(pushed_J).epsilon(1e-9));
-    // Without it, it falls freely; with nine tenths of its mass told, by a tenth of that.
+    // Without compensation it falls freely; with nine tenths of its mass compensated, by a tenth of that.
     CHECK(falling.v_C.norm() == Approx(g).epsilon(1e-9));
     CHECK(sagging.v_C.norm() == Approx(0.1 * g).epsilon(1e-9));
   }
 }
 
-TEST_CASE("masses that cannot be are refused", "[gravity]") {
+TEST_CASE("invalid masses are rejected", "[gravity]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Quaterniond level = Quaterniond::Identity();
   CHECK_NOTHROW(GravityCompensation({}, level));
@@ -168,7 +168,7 @@ TEST_CASE("masses that cannot be are refused", "[gravity]") {
   CHECK_THROWS_WITH(GravityCompensation({}, Quaterniond(nan, 0, 0, 0)), Catch::Contains("unit quaternion"));
 }
 
-TEST_CASE("the servo thread may ask for it", "[gravity]") {
+TEST_CASE("gravity compensation neither allocates nor locks", "[gravity]") {
   RandomValues random(10);
   const GravityCompensation gravity(random_masses(random), random.rotation());
   const Pose X_BH = random.pose(0.1);

@@ -15,7 +15,7 @@ Matrix6d matrix(const HessianBlocks& h) {
   return W;
 }
 
-/// A Hessian whose Schur complement B - C'C/2 is S.
+/// Returns a Hessian with the Schur complement B - C'C/2 = S.
 HessianBlocks with_schur_complement(RandomValues& random, const Matrix3d& S) {
   HessianBlocks h;
   h.C = Matrix3d::NullaryExpr([&] { return random.normal(); });

@@ -54,7 +54,7 @@ TriangleMesh inside_out(TriangleMesh mesh) {
   return mesh;
 }
 
-/// Every triangle cut into four: another mesh of the same solid.
+/// Returns another mesh of the same solid: every triangle divided into four.
 TriangleMesh refined(const TriangleMesh& mesh) {
   TriangleMesh fine = mesh;
   fine.triangles.clear();
@@ -109,10 +109,10 @@ TEST_CASE("a regular tetrahedron: m s^2 / 20 about every axis", "[inertia]") {
   require_equal(solid.inertia.H_kg_m2, 3.0 * s2 / 20.0 * Matrix3d::Identity(), 1e-14);
 }
 
-TEST_CASE("the tetrahedron worked out by Tonon", "[inertia]") {
+TEST_CASE("Tonon's example of a tetrahedron", "[inertia]") {
   // F. Tonon, Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex
-  // coordinates, J. Math. Stat. 1 (2005): unit density, volume 1873.233236. Printed to nine digits, with
-  // vertices of six.
+  // coordinates, J. Math. Stat. 1 (2005): unit density, volume 1873.233236. The paper
+  // prints nine digits for vertices of six digits.
   const TriangleMesh mesh = tetrahedron({Vector3d(8.33220, -11.86875, 0.93355),
                                          {0.75523, 5.00000, 16.37072},
                                          {52.61236, 5.00000, -5.38580},
@@ -130,7 +130,7 @@ TEST_CASE("the tetrahedron worked out by Tonon", "[inertia]") {
   CHECK(H(0, 1) == Approx(-11996.20119).epsilon(2e-7).margin(1e-2));
 }
 
-TEST_CASE("a tetrahedron: its second moments are those of its corners", "[inertia]") {
+TEST_CASE("the second moments of a tetrahedron follow from its corners", "[inertia]") {
   // int (x - c)(x - c)' dV / V = sum (p_i - c)(p_i - c)' / 20
   RandomValues random(2);
   for (int i = 0; i < 500; ++i) {
@@ -146,7 +146,7 @@ TEST_CASE("a tetrahedron: its second moments are those of its corners", "[inerti
   }
 }
 
-TEST_CASE("moving a solid moves its centre of mass and turns its inertia", "[inertia]") {
+TEST_CASE("moving a solid moves its centre of mass and rotates its inertia", "[inertia]") {
   RandomValues random(3);
   for (int i = 0; i < 500; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
@@ -173,7 +173,7 @@ TEST_CASE("lengths times c: volume times c^3, inertia times c^2 at equal mass", 
   }
 }
 
-TEST_CASE("mass times c: inertia times c, and the centre stays", "[inertia]") {
+TEST_CASE("mass times c: inertia times c, same centre of mass", "[inertia]") {
   RandomValues random(5);
   for (int i = 0; i < 200; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
@@ -187,7 +187,7 @@ TEST_CASE("mass times c: inertia times c, and the centre stays", "[inertia]") {
   }
 }
 
-TEST_CASE("the solid does not depend on how its faces are cut into triangles", "[inertia]") {
+TEST_CASE("mass properties do not depend on the triangulation of the faces", "[inertia]") {
   RandomValues random(6);
   for (int i = 0; i < 50; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
@@ -222,7 +222,7 @@ TEST_CASE("two solids side by side are one: the parallel axis theorem", "[inerti
   }
 }
 
-TEST_CASE("an inertia is symmetric, positive, and obeys the triangle inequality", "[inertia]") {
+TEST_CASE("an inertia is symmetric, positive, and satisfies the triangle inequality", "[inertia]") {
   RandomValues random(8);
   for (int i = 0; i < 500; ++i) {
     const Matrix3d H = solid_properties(random_tetrahedron(random), 1.0).inertia.H_kg_m2;
@@ -233,8 +233,8 @@ TEST_CASE("an inertia is symmetric, positive, and obeys the triangle inequality"
   }
 }
 
-TEST_CASE("a body a thousand kilometres from the mesh's origin keeps its digits", "[inertia]") {
-  // The coordinates themselves are rounded to 1e-10 m there: that is all that may be lost.
+TEST_CASE("mass properties are accurate for a mesh a thousand kilometres from its origin", "[inertia]") {
+  // The coordinates are rounded to 1e-10 m; the tolerance is that rounding.
   RandomValues random(9);
   for (int i = 0; i < 200; ++i) {
     const TriangleMesh near = random_tetrahedron(random);
@@ -245,7 +245,7 @@ TEST_CASE("a body a thousand kilometres from the mesh's origin keeps its digits"
     REQUIRE((there.p_MT_m - (here.p_MT_m + away)).norm() <= 1e-9);
     require_equal(there.inertia.H_kg_m2, here.inertia.H_kg_m2, 1e-8);
   }
-  // With coordinates that are exact there, nothing is lost at all.
+  // With exactly representable coordinates the result is exact.
   const TriangleMesh cube = box(1.0, 2.0, 4.0);
   const Vector3d away(1048576.0, -1048576.0, 524288.0);
   const SolidProperties there = solid_properties(moved(cube, {Quaterniond::Identity(), away}), 12.0);
@@ -254,7 +254,7 @@ TEST_CASE("a body a thousand kilometres from the mesh's origin keeps its digits"
   require_equal(there.inertia.H_kg_m2, Vector3d(20.0, 17.0, 5.0).asDiagonal(), 1e-15);
 }
 
-TEST_CASE("an inside-out mesh says so by its volume", "[inertia]") {
+TEST_CASE("an inside-out mesh has a negative volume", "[inertia]") {
   RandomValues random(10);
   for (int i = 0; i < 100; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
@@ -264,7 +264,7 @@ TEST_CASE("an inside-out mesh says so by its volume", "[inertia]") {
   }
 }
 
-TEST_CASE("a mesh without a volume says so", "[inertia]") {
+TEST_CASE("a mesh without a volume is reported", "[inertia]") {
   CHECK(solid_properties(TriangleMesh{}, 1.0).volume_m3 == 0.0);
   CHECK(solid_properties(box(1.0, 1.0, 0.0), 1.0).volume_m3 == 0.0);
   TriangleMesh not_a_number = box(1.0, 1.0, 1.0);

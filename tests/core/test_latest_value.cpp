@@ -12,7 +12,7 @@ using namespace wrenchd;
 
 namespace {
 
-/// Large enough that a copy takes a while: a torn one has parts of two numbers.
+/// Large, so that a copy takes long; a torn copy contains parts of two numbers.
 struct Large {
   std::array<std::uint64_t, 64> parts{};
 
@@ -27,7 +27,7 @@ struct Large {
 
 }  // namespace
 
-TEST_CASE("nothing was written: nothing is read, and the reader's value stays", "[latest_value]") {
+TEST_CASE("without a write the reader keeps its value", "[latest_value]") {
   LatestValue<int> latest;
   int value = 7;
   CHECK_FALSE(latest.read(value));
@@ -46,7 +46,7 @@ TEST_CASE("a value is taken once", "[latest_value]") {
   }
 }
 
-TEST_CASE("of several values the reader gets the newest, and none of the older", "[latest_value]") {
+TEST_CASE("the reader takes the newest of several values only", "[latest_value]") {
   LatestValue<int> latest;
   int value = 0;
   for (int burst = 1; burst <= 20; ++burst) {
@@ -57,8 +57,7 @@ TEST_CASE("of several values the reader gets the newest, and none of the older",
   }
 }
 
-TEST_CASE("between two threads no value is torn, none comes back, and the newest is seen in the end",
-          "[latest_value]") {
+TEST_CASE("between two threads no value is torn or repeated, and the newest arrives", "[latest_value]") {
   constexpr std::uint64_t kLast = 100'000;
   LatestValue<Large> latest;
   std::atomic<bool> done{false};
@@ -67,7 +66,7 @@ TEST_CASE("between two threads no value is torn, none comes back, and the newest
     done.store(true, std::memory_order_release);
   });
 
-  // Counted here and checked after the join: a failed check must not leave a running thread behind.
+  // Checked after the join, because a failed check would leave a running thread.
   std::uint64_t seen = 0;
   std::uint64_t reads = 0;
   std::uint64_t torn = 0;
@@ -92,7 +91,7 @@ TEST_CASE("between two threads no value is torn, none comes back, and the newest
   CHECK(seen == kLast);
 }
 
-TEST_CASE("two directions at once: each thread sees the other's newest", "[latest_value]") {
+TEST_CASE("in two directions at once each thread takes the newest value of the other", "[latest_value]") {
   constexpr std::uint64_t kRounds = 2'000;
   LatestValue<Large> there;
   LatestValue<Large> back;

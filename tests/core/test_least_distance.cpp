@@ -16,7 +16,7 @@ using test::RandomValues;
 namespace {
 
 constexpr std::size_t kCapacity = 64;
-constexpr double kTolerance = 2e-15;  // what the projection asks for
+constexpr double kTolerance = 2e-15;  // tolerance of the projection
 
 template <int N>
 using Vector = Eigen::Matrix<double, N, 1>;
@@ -37,7 +37,7 @@ LeastDistance<N, kCapacity> posed(const Rows<N>& rows) {
   return problem;
 }
 
-/// How far an answer is from the conditions of Karush, Kuhn and Tucker, each in units of the problem.
+/// Residuals of the Karush-Kuhn-Tucker conditions, relative to the size of the problem.
 struct Violation {
   double stationarity = 0.0;     ///< z - z0 = sum lambda_i b_i
   double primal = 0.0;           ///< b_i . z >= c_i, |b_i| = 1
@@ -78,7 +78,7 @@ void require_optimal(const Rows<N>& rows, const Vector<N>& z0, double rounding) 
   REQUIRE(worst.complementarity <= rounding * scale * scale);
 }
 
-/// Rows with a point in common, which many of them pass through, and with room beside it: there is an answer.
+/// Returns feasible rows: all admit a common point, and many pass through it.
 template <int N>
 Rows<N> admissible_rows(RandomValues& random, int count, const Vector<N>& inside) {
   Rows<N> rows;
@@ -93,7 +93,7 @@ Rows<N> admissible_rows(RandomValues& random, int count, const Vector<N>& inside
   return rows;
 }
 
-/// The answer by trying every set of rows that may be active: the one set whose answer meets all conditions.
+/// Returns the solution by brute force: tries every active set until all conditions hold.
 template <int N>
 std::optional<Vector<N>> by_enumeration(const Rows<N>& rows, const Vector<N>& z0) {
   constexpr double kSlack = 1e-9;
@@ -150,7 +150,7 @@ TEMPLATE_TEST_CASE_SIG("the nearest point meets the optimality conditions over r
   }
 }
 
-TEST_CASE("where nothing is violated the point stays, to the bit", "[least_distance]") {
+TEST_CASE("a feasible point stays unchanged, bit for bit", "[least_distance]") {
   RandomValues random(2);
   LeastDistance<3, kCapacity> none;
   const Vector3d anywhere = random.vector<3>();
@@ -201,15 +201,15 @@ TEMPLATE_TEST_CASE_SIG("the answer is that of trying every set of active rows", 
   for (int i = 0; i < 1'500; ++i) {
     Rows<N> rows;
     const int count = random.integer(1, 7);
-    for (int k = 0; k < count; ++k) rows.push_back({random.vector<N>(), random.normal()});  // some contradict
+    for (int k = 0; k < count; ++k)
+      rows.push_back({random.vector<N>(), random.normal()});  // some are infeasible
     require_same_as_enumeration<N>(rows, random.vector<N>());
   }
 }
 
 TEMPLATE_TEST_CASE_SIG("rows that repeat, oppose and lie in one plane are met as such", "[least_distance]",
                        ((int N), N), 2, 3, 6) {
-  // Whole numbers: equal rows are equal to the bit, sums of rows are rows, opposite rows leave a point or
-  // nothing.
+  // Integers: many rows are equal, sums of others, or opposite.
   RandomValues random(6);
   for (int i = 0; i < 2'000; ++i) {
     Rows<N> rows;
@@ -244,8 +244,7 @@ TEST_CASE("forty copies of a row are one row", "[least_distance]") {
 }
 
 TEST_CASE("forty rows that span a plane only: a fan about one line", "[least_distance]") {
-  // As when a tool turns about an edge that lies on the obstacle: all rows hold one line, any two of them
-  // suffice.
+  // The case of a tool that rotates about an edge on the obstacle: any two rows determine the solution.
   RandomValues random(8);
   for (int i = 0; i < 500; ++i) {
     const Vector<6> on_line = random.vector<6>();
@@ -261,8 +260,7 @@ TEST_CASE("forty rows that span a plane only: a fan about one line", "[least_dis
   }
 }
 
-TEST_CASE("a face that rests on forty vertices: more rows touch than there are unknowns",
-          "[least_distance]") {
+TEST_CASE("a face on forty vertices: more active rows than unknowns", "[least_distance]") {
   RandomValues random(9);
   for (int i = 0; i < 500; ++i) {
     Rows<6> face;  // J = [n; a x n] for vertices a in a plane, all at the same depth
@@ -297,7 +295,7 @@ TEST_CASE("nearly parallel rows", "[least_distance]") {
       REQUIRE(problem.solve(z0, 1e-13) == Status::optimal);
       const Violation worst = violation(problem, rows, z0);
       REQUIRE(worst.primal <= 1e-13);
-      // No farther than the point that all rows pass through, and no nearer than the deepest row allows.
+      // At most as far as the common point, and at least as far as the most violated row.
       REQUIRE((problem.z() - z0).norm() <= 1.0 + 1e-12);
       double deepest = 0.0;
       for (const Row<6>& row : rows) deepest = std::max(deepest, row.c - row.b.dot(z0));
@@ -332,8 +330,7 @@ TEMPLATE_TEST_CASE_SIG("rows that contradict each other are found out", "[least_
   }
 }
 
-TEST_CASE("two walls closer together than the body: infeasible; with room: in the middle",
-          "[least_distance]") {
+TEST_CASE("two walls closer than the body: infeasible; farther apart: the middle", "[least_distance]") {
   for (const double room : {-1.0, -1e-3, -1e-9, -1e-13}) {
     auto problem = posed<3>({{Vector3d::UnitX(), 0.0}, {-Vector3d::UnitX(), -room}});
     INFO("room " << room);
@@ -347,7 +344,7 @@ TEST_CASE("two walls closer together than the body: infeasible; with room: in th
   }
 }
 
-TEST_CASE("the length of a row does not matter, and its multiplier is for the row as given",
+TEST_CASE("the length of a row does not change the solution; the multiplier refers to the given row",
           "[least_distance]") {
   RandomValues random(12);
   for (int i = 0; i < 1'000; ++i) {
@@ -356,7 +353,7 @@ TEST_CASE("the length of a row does not matter, and its multiplier is for the ro
     Rows<6> longer = rows;
     std::vector<double> factor;
     for (Row<6>& row : longer) {
-      factor.push_back(std::ldexp(1.0, random.integer(-30, 30)));  // a power of two rounds nothing
+      factor.push_back(std::ldexp(1.0, random.integer(-30, 30)));  // a power of two, which is exact
       row.b *= factor.back();
       row.c *= factor.back();
     }
@@ -369,7 +366,7 @@ TEST_CASE("the length of a row does not matter, and its multiplier is for the ro
   }
 }
 
-TEST_CASE("one object serves one problem after the other", "[least_distance]") {
+TEST_CASE("one solver object solves several problems in turn", "[least_distance]") {
   RandomValues random(13);
   LeastDistance<6, kCapacity> reused;
   for (int i = 0; i < 500; ++i) {

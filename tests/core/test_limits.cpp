@@ -24,7 +24,7 @@ constexpr double kTick_s = 1e-3;
 constexpr double kMost = std::numeric_limits<double>::max();
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 
-/// Room for anything but what the test is about.
+/// Limits that are wide except for the tested one.
 LimitSettings without_slew() {
   LimitSettings s;
   s.force_slew_N_per_s = s.torque_slew_Nm_per_s = 1e30;
@@ -38,7 +38,7 @@ LimitSettings slew(double force_N_per_s, double torque_Nm_per_s) {
   return s;
 }
 
-/// A device with these maxima, and no other limit.
+/// Returns a profile with these maxima and no other limit.
 DeviceProfile device(double max_force_N, double max_torque_Nm) {
   DeviceProfile profile;
   profile.max_force_N = max_force_N;
@@ -46,7 +46,7 @@ DeviceProfile device(double max_force_N, double max_torque_Nm) {
   return profile;
 }
 
-/// The handle at rest in the middle.
+/// Returns the input of a handle at rest in the centre of the workspace.
 LimitInput input(const Wrench& asked, double authority = 1.0, double dt_s = kTick_s) {
   return {asked, authority, dt_s, Twist{}, Vector3d::Zero()};
 }
@@ -58,7 +58,7 @@ Wrench torque(double x, double y, double z) {
   return {Vector3d::Zero(), {x, y, z}};
 }
 
-/// Cosine of the angle between two vectors, of any length there is.
+/// Returns the cosine of the angle between two vectors of any finite length.
 double cosine(const Vector3d& a, const Vector3d& b) {
   const auto unit = [](const Vector3d& v) -> Vector3d { return (v / v.cwiseAbs().maxCoeff()).normalized(); };
   return unit(a).dot(unit(b));
@@ -71,13 +71,13 @@ const std::vector<double> kNotFiniteValues = {
     std::bit_cast<double>(std::uint64_t{0xfff8'0000'0000'0000}),
     std::bit_cast<double>(std::uint64_t{0x7ff0'0000'0000'0001}),  // signalling NaN
     std::bit_cast<double>(std::uint64_t{0xfff0'0000'0000'0001}),
-    std::bit_cast<double>(std::uint64_t{0x7fff'ffff'ffff'ffff}),  // all payload
+    std::bit_cast<double>(std::uint64_t{0x7fff'ffff'ffff'ffff}),  // full payload
     std::bit_cast<double>(std::uint64_t{0xffff'ffff'ffff'ffff}),
 };
 
 }  // namespace
 
-TEST_CASE("what is within all limits goes out unchanged, to the bit", "[limits]") {
+TEST_CASE("a wrench within all limits stays unchanged, bit for bit", "[limits]") {
   RandomValues random(1);
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   for (int i = 0; i < 10'000; ++i) {
@@ -90,7 +90,7 @@ TEST_CASE("what is within all limits goes out unchanged, to the bit", "[limits]"
   }
 }
 
-TEST_CASE("NaN or infinity of any kind in any slot: zero goes out, and says so", "[limits]") {
+TEST_CASE("NaN or infinity in any component: the output is zero, with the cause", "[limits]") {
   for (const double bad : kNotFiniteValues)
     for (int slot = 0; slot < 6; ++slot) {
       WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
@@ -102,14 +102,14 @@ TEST_CASE("NaN or infinity of any kind in any slot: zero goes out, and says so",
       REQUIRE(out.F.force_N == Vector3d::Zero());
       REQUIRE(out.F.torque_Nm == Vector3d::Zero());
       REQUIRE(out.causes == kNotFinite);
-      // What follows grows from zero again.
+      // The next wrench grows from zero.
       const Limited after = limits.apply(input(force(5.0, 0.0, 0.0)));
       REQUIRE(after.F.force_N.norm() == Approx(kTick_s));
       REQUIRE(after.causes == kForceSlew);
     }
 }
 
-TEST_CASE("a twist or a place that is not finite: zero goes out", "[limits]") {
+TEST_CASE("a twist or position that is not finite: the output is zero", "[limits]") {
   for (const double bad : kNotFiniteValues)
     for (int slot = 0; slot < 9; ++slot) {
       WrenchLimits limits(without_slew(), device(10.0, 1.0));
@@ -124,7 +124,7 @@ TEST_CASE("a twist or a place that is not finite: zero goes out", "[limits]") {
     }
 }
 
-TEST_CASE("an authority or a time that is not a number: zero goes out", "[limits]") {
+TEST_CASE("an authority or time step that is not a number: the output is zero", "[limits]") {
   for (const double bad : kNotFiniteValues) {
     WrenchLimits limits(without_slew(), device(10.0, 1.0));
     limits.apply(input(force(5.0, 0.0, 0.0)));
@@ -137,7 +137,7 @@ TEST_CASE("an authority or a time that is not a number: zero goes out", "[limits
   }
 }
 
-TEST_CASE("too long a force or torque is shortened to its limit, in its direction", "[limits]") {
+TEST_CASE("a force or torque above its maximum is clamped and keeps its direction", "[limits]") {
   RandomValues random(2);
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   for (int i = 0; i < 20'000; ++i) {
@@ -155,7 +155,7 @@ TEST_CASE("too long a force or torque is shortened to its limit, in its directio
   }
 }
 
-TEST_CASE("the longest vectors there are keep their direction too", "[limits]") {
+TEST_CASE("vectors of the largest finite length keep their direction", "[limits]") {
   for (const double most : {kMost, 0.5 * kMost, 1e308, 1e200, 1e155, 1e154})
     for (const Vector3d& sign :
          {Vector3d(1, 1, 1), Vector3d(-1, 1, 0), Vector3d(0, 0, -1), Vector3d(0.5, -1, 0.25)}) {
@@ -170,7 +170,7 @@ TEST_CASE("the longest vectors there are keep their direction too", "[limits]") 
     }
 }
 
-TEST_CASE("force and torque are limited each on its own", "[limits]") {
+TEST_CASE("force and torque are limited separately", "[limits]") {
   RandomValues random(3);
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   for (int i = 0; i < 1'000; ++i) {
@@ -185,14 +185,14 @@ TEST_CASE("force and torque are limited each on its own", "[limits]") {
   }
 }
 
-TEST_CASE("settings may tighten the profile's limits, never loosen them", "[limits]") {
+TEST_CASE("settings can tighten the limits of the profile, but not loosen them", "[limits]") {
   const auto limits_with = [](double force_N, double torque_Nm) {
     LimitSettings s = without_slew();
     s.max_force_N = force_N;
     s.max_torque_Nm = torque_Nm;
     return WrenchLimits(s, device(10.0, 1.0));
   };
-  CHECK(limits_with(0.0, 0.0).max_force_N() == 10.0);  // 0: the profile's own
+  CHECK(limits_with(0.0, 0.0).max_force_N() == 10.0);  // 0: the limit of the profile
   CHECK(limits_with(0.0, 0.0).max_torque_Nm() == 1.0);
   CHECK(limits_with(4.0, 0.3).max_force_N() == 4.0);
   CHECK(limits_with(4.0, 0.3).max_torque_Nm() == 0.3);
@@ -208,7 +208,7 @@ TEST_CASE("settings may tighten the profile's limits, never loosen them", "[limi
   CHECK(tight.apply(input(torque(100.0, 0.0, 0.0))).F.torque_Nm.norm() <= 0.3);
 }
 
-TEST_CASE("authority scales what is asked for, after the magnitude", "[limits]") {
+TEST_CASE("authority scales the wrench after the magnitude limit", "[limits]") {
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   const Limited half = limits.apply(input(force(100.0, 0.0, 0.0), 0.5));
   CHECK(half.F.force_N.x() == Approx(5.0));
@@ -217,12 +217,13 @@ TEST_CASE("authority scales what is asked for, after the magnitude", "[limits]")
   CHECK(none.F.force_N == Vector3d::Zero());
   CHECK(none.causes == kAuthority);
   CHECK(limits.apply(input(force(3.0, 4.0, 0.0), -7.0)).F.force_N == Vector3d::Zero());
-  const Limited more = limits.apply(input(force(3.0, 4.0, 0.0), 7.0));  // never more than was asked for
+  const Limited more =
+      limits.apply(input(force(3.0, 4.0, 0.0), 7.0));  // never more than the requested wrench
   CHECK(more.F.force_N == Vector3d(3.0, 4.0, 0.0));
   CHECK(more.causes == kNotLimited);
 }
 
-TEST_CASE("a force grows no faster than its rate, and arrives", "[limits]") {
+TEST_CASE("a force grows at most at its slew rate and reaches its value", "[limits]") {
   WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
   for (int tick = 1; tick < 5; ++tick) {
     const Limited out = limits.apply(input(force(0.0, 10.0, 0.0)));
@@ -235,7 +236,7 @@ TEST_CASE("a force grows no faster than its rate, and arrives", "[limits]") {
   CHECK(arrived.causes == kNotLimited);
 }
 
-TEST_CASE("a torque has its own rate", "[limits]") {
+TEST_CASE("a torque has its own slew rate", "[limits]") {
   WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
   const Limited out = limits.apply(input({{1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}));
   CHECK(out.F.force_N == Vector3d(1.0, 0.0, 0.0));
@@ -243,7 +244,7 @@ TEST_CASE("a torque has its own rate", "[limits]") {
   CHECK(out.causes == kTorqueSlew);
 }
 
-TEST_CASE("towards zero is free: letting go is never delayed", "[limits]") {
+TEST_CASE("force may decrease at any rate", "[limits]") {
   RandomValues random(4);
   for (int i = 0; i < 1'000; ++i) {
     WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
@@ -251,20 +252,20 @@ TEST_CASE("towards zero is free: letting go is never delayed", "[limits]") {
     limits.set_last_sent(full);
     const double share = i % 3 == 0 ? 0.0 : random.uniform(0.0, 1.0);
     const Wrench less{share * full.force_N, share * full.torque_Nm};
-    const Limited out = limits.apply(input(less, 1.0, 0.0));  // no time at all
+    const Limited out = limits.apply(input(less, 1.0, 0.0));  // time step 0
     REQUIRE((out.F.force_N - less.force_N).norm() <= 1e-14);
     REQUIRE((out.F.torque_Nm - less.torque_Nm).norm() <= 1e-14);
   }
 }
 
-TEST_CASE("a fall of authority is free, a rise is not", "[limits]") {
+TEST_CASE("authority may fall at any rate; a rise is limited by the slew rate", "[limits]") {
   WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
   limits.set_last_sent(force(9.0, 0.0, 0.0));
   CHECK(limits.apply(input(force(9.0, 0.0, 0.0), 0.0)).F.force_N.norm() == 0.0);
   CHECK(limits.apply(input(force(9.0, 0.0, 0.0))).F.force_N.norm() == Approx(1e-3));
 }
 
-TEST_CASE("a reversal: the old force is gone at once, the new one grows from zero at the rate", "[limits]") {
+TEST_CASE("on a reversal the old force ends immediately and the new force grows from zero", "[limits]") {
   WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
   limits.apply(input(force(8.0, 0.0, 0.0), 1.0, 1.0));
   for (int tick = 1; tick < 4; ++tick) {
@@ -274,24 +275,24 @@ TEST_CASE("a reversal: the old force is gone at once, the new one grows from zer
   }
 }
 
-TEST_CASE("a force that turns keeps what it has in common with the last", "[limits]") {
+TEST_CASE("a rotating force keeps its component along the previous force", "[limits]") {
   WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
   limits.apply(input(force(8.0, 0.0, 0.0), 1.0, 1.0));
-  const Limited out = limits.apply(input(force(3.0, 7.0, 0.0)));  // 3 of the old, and 2 N of the new
+  const Limited out = limits.apply(input(force(3.0, 7.0, 0.0)));  // 3 N along the previous force, 2 N across
   CHECK(out.F.force_N.x() == Approx(3.0).epsilon(1e-14));
   CHECK(out.F.force_N.y() == Approx(2.0).epsilon(1e-14));
 }
 
-TEST_CASE("a small turn of a full force passes", "[limits]") {
+TEST_CASE("a small rotation of the maximum force passes unchanged", "[limits]") {
   WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
   limits.apply(input(force(9.9, 0.0, 0.0), 1.0, 1.0));
-  const double angle = 0.1;  // 1 N across, in a tick that allows 2
+  const double angle = 0.1;  // 1 N across; the slew rate allows 2 N
   const Limited out = limits.apply(input(force(9.9 * std::cos(angle), 9.9 * std::sin(angle), 0.0)));
   CHECK(out.causes == kNotLimited);
   CHECK(out.F.force_N.y() == Approx(9.9 * std::sin(angle)).epsilon(1e-14));
 }
 
-TEST_CASE("no time, or time that runs backwards: nothing grows", "[limits]") {
+TEST_CASE("with a time step of zero or less no force grows", "[limits]") {
   for (const double dt_s : {0.0, -0.0, -1e-3, -1e300}) {
     WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
     CHECK(limits.apply(input(force(5.0, 0.0, 0.0), 1.0, dt_s)).F.force_N.norm() == 0.0);
@@ -307,9 +308,9 @@ TEST_CASE("after a reset the next wrench grows from zero", "[limits]") {
   CHECK(limits.apply(input(force(8.0, 0.0, 0.0))).F.force_N.x() == Approx(2.0));
 }
 
-// A public robot library's rate limiter divides the room that is left by the speed it has: at the limit, or
-// over it, the root of a negative number is NaN, the comparison with it false, and the limit open.
-TEST_CASE("over the limit before does not open the limit", "[limits]") {
+// A known error of rate limiters: at or above the limit they compute the root of a negative number. A
+// comparison with the resulting NaN is false, so nothing is limited.
+TEST_CASE("a previous wrench above the limit does not raise the limit", "[limits]") {
   RandomValues random(6);
   for (const double before : {10.0, 10.0 * (1.0 + 1e-15), 10.1, 12.0, 40.0, 1e6, 1e160, kMost}) {
     const Vector3d direction = random.unit<3>();
@@ -326,7 +327,7 @@ TEST_CASE("over the limit before does not open the limit", "[limits]") {
   }
 }
 
-TEST_CASE("a last wrench that is not finite is none: the next grows from zero", "[limits]") {
+TEST_CASE("after a previous wrench that is not finite the next one grows from zero", "[limits]") {
   for (const double bad : kNotFiniteValues) {
     WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
     limits.set_last_sent({{bad, 1.0, 1.0}, {1.0, bad, 1.0}});
@@ -336,14 +337,14 @@ TEST_CASE("a last wrench that is not finite is none: the next grows from zero", 
   }
 }
 
-TEST_CASE("a long step is not made up for", "[limits]") {
+TEST_CASE("a long time step does not permit a larger growth", "[limits]") {
   for (const double dt_s : {kMaxStep_s, 0.02, 1.0, 3600.0, kMost}) {
     WrenchLimits limits(slew(500.0, 50.0), device(10.0, 1.0));
     CHECK(limits.apply(input(force(9.0, 0.0, 0.0), 1.0, dt_s)).F.force_N.norm() == Approx(5.0));
   }
 }
 
-TEST_CASE("what nobody stated is no licence", "[limits]") {
+TEST_CASE("limits that are not stated permit no force", "[limits]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double none : {nan, -1.0, 0.0, std::numeric_limits<double>::infinity()}) {
     WrenchLimits silent(without_slew(), device(none, none));
@@ -361,7 +362,7 @@ TEST_CASE("what nobody stated is no licence", "[limits]") {
   CHECK(any.max_torque_Nm() == kAbsoluteMaxTorque_Nm);
 }
 
-TEST_CASE("a thermal ceiling cuts below the maximum, each group on its own, and never lifts it", "[limits]") {
+TEST_CASE("the thermal limits clamp force and torque separately and never raise the maximum", "[limits]") {
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   limits.set_ceiling(4.0, 1.0);
   const Limited warm = limits.apply(input({{0.0, 100.0, 0.0}, {0.0, 0.5, 0.0}}));
@@ -387,7 +388,7 @@ TEST_CASE("a thermal ceiling cuts below the maximum, each group on its own, and 
   CHECK(limits.apply(input(force(5.0, 0.0, 0.0))).F.force_N == Vector3d::Zero());
 }
 
-TEST_CASE("outside of its workspace the wrench fades along a straight line, to zero at 1.1 radius",
+TEST_CASE("outside of the workspace the wrench decreases linearly, to zero at 1.1 times the radius",
           "[limits]") {
   DeviceProfile profile = device(10.0, 1.0);
   profile.workspace_radius_m = 0.2;
@@ -420,8 +421,7 @@ TEST_CASE("outside of its workspace the wrench fades along a straight line, to z
   CHECK(endless.apply(far).causes == kNotLimited);
 }
 
-TEST_CASE("no more power than allowed goes into the hand, by one factor for all, and braking is free",
-          "[limits]") {
+TEST_CASE("power into the hand is limited by one common factor; braking is not limited", "[limits]") {
   DeviceProfile profile = device(10.0, 1.0);
   profile.max_power_W = 2.0;
   WrenchLimits limits(without_slew(), profile);
@@ -436,9 +436,9 @@ TEST_CASE("no more power than allowed goes into the hand, by one factor for all,
   CHECK(pushed.causes == kPower);
   CHECK(moving({0.19, 5.0, 0.0}, {0.0, 2.0, 0.0}).causes == kNotLimited);   // 0.95 W and 1 W
   CHECK(moving({-5.0, 0.0, 0.0}, {0.0, 0.0, 0.0}).causes == kNotLimited);   // brakes with 25 W
-  CHECK(moving({0.6, 0.0, 0.0}, {0.0, -2.01, 0.0}).causes == kNotLimited);  // less than 2 W in all
+  CHECK(moving({0.6, 0.0, 0.0}, {0.0, -2.01, 0.0}).causes == kNotLimited);  // less than 2 W in total
   CHECK(moving({1e308, 0.0, 0.0}, {0.0, -1e308, 0.0}).F.force_N.norm() < 1e-300);
-  // The slew holds back the torque that braked: the force alone would push with 3 W.
+  // The slew limit reduces the braking torque: the force alone would have 3 W.
   WrenchLimits slow(slew(2000.0, 0.1), profile);
   slow.set_last_sent(force(5.0, 0.0, 0.0));
   LimitInput in = input({{5.0, 0.0, 0.0}, {0.0, 0.5, 0.0}});
@@ -451,19 +451,15 @@ TEST_CASE("no more power than allowed goes into the hand, by one factor for all,
   CHECK(any.apply(in).causes == kNotLimited);
 }
 
-TEST_CASE("each cause has a name, and a mask is the list of them", "[limits]") {
-  CHECK(limit_causes_text(kNotLimited) == "none");
-  CHECK(limit_causes_text(kForceMagnitude | kPower) == "force magnitude, power");
-  CHECK(limit_causes_text(kTorqueThermal | kWorkspaceEdge | kAuthority) ==
-        "authority, torque thermal, workspace edge");
+TEST_CASE("each limit cause has a name", "[limits]") {
   std::set<std::string> names;
   for (unsigned bit = 1; bit <= kPower; bit *= 2) names.insert(text(static_cast<LimitCause>(bit)));
   CHECK(names.size() == 10);
   CHECK(names.count("unknown") == 0);
-  CHECK(limit_causes_text(0x8000) == "unknown");
+  CHECK(text(static_cast<LimitCause>(0x8000)) == std::string("unknown"));
 }
 
-TEST_CASE("a million ticks of anything keep every invariant of the oracle", "[limits]") {
+TEST_CASE("a million random ticks satisfy every invariant of the oracle", "[limits]") {
   constexpr std::uint64_t kSeed = 20'251'122;
   constexpr int kCases = 1'000'000;
   test::LimitCases cases(kSeed);
@@ -475,7 +471,7 @@ TEST_CASE("a million ticks of anything keep every invariant of the oracle", "[li
     for (unsigned bit = 0; bit < 16; ++bit) seen[bit] += cases.out().causes >> bit & 1;
     untouched += cases.out().causes == kNotLimited ? 1 : 0;
   }
-  // No stream of cases that leaves a limit alone proves it.
+  // Every limit must have acted, otherwise the test covers too little.
   for (unsigned bit = 0; bit < 10; ++bit) {
     INFO(text(static_cast<LimitCause>(1u << bit)) << " in " << seen[bit] << " cases");
     CHECK(seen[bit] > kCases / 100);

@@ -19,8 +19,8 @@ using std::chrono::microseconds;
 
 constexpr Duration kMillisecond = microseconds(1000);
 
-/// A device that reports every millisecond, on a line that takes 200 us each way; it takes what came before
-/// its sample. The host ticks every millisecond, 300 us after a report has come.
+/// A device that reports every millisecond, with a transport delay of 200 us in each direction. A report
+/// acknowledges commands that arrived before its sample. The host ticks 300 us after each report.
 struct Link {
   std::uint64_t lag = 1;  ///< ticks between a command and the report that acknowledges it
   bool acknowledges = true;
@@ -43,7 +43,7 @@ struct Link {
 
 }  // namespace
 
-TEST_CASE("a steady loop is measured as it is", "[loop_measurement]") {
+TEST_CASE("the measurement of a steady loop is exact", "[loop_measurement]") {
   LoopMeasurement measured(0.009);
   const Link link;
   for (std::uint64_t n = 0; n < 1000; ++n) measured.tick(link.tick(n));
@@ -58,10 +58,10 @@ TEST_CASE("a steady loop is measured as it is", "[loop_measurement]") {
   // Sent at n, acknowledged by the report that came 0.7 ms later.
   CHECK(measured.round_trip_s().mean_s() == Approx(0.7e-3));
   CHECK(measured.delay_s() == Approx(1.0e-3));
-  CHECK(measured.typical_delay_s() == Approx(0.5e-3));  // half a report of it the device waited
+  CHECK(measured.typical_delay_s() == Approx(0.5e-3));  // the device waited for half a report period
 }
 
-TEST_CASE("the round trip is that of the command acknowledged, however many are under way",
+TEST_CASE("the round trip belongs to the acknowledged command, for any number of pending commands",
           "[loop_measurement]") {
   for (const std::uint64_t lag : {1u, 2u, 5u, 40u}) {
     LoopMeasurement measured(0.0);
@@ -73,29 +73,29 @@ TEST_CASE("the round trip is that of the command acknowledged, however many are 
   }
 }
 
-TEST_CASE("a lost report makes the sample older, a lost command the round trip longer",
-          "[loop_measurement]") {
+TEST_CASE("a lost report increases the sample age, a lost command the round trip", "[loop_measurement]") {
   LoopMeasurement measured(0.0);
   const Link link;
   for (std::uint64_t n = 0; n < 1000; ++n) {
     TickTimes t = link.tick(n);
-    if (n % 20 == 10) {  // this tick got no report
+    if (n % 20 == 10) {  // this tick has no report
       t.new_report = false;
       t.arrived = link.tick(n - 1).arrived;
       t.sequence = link.tick(n - 1).sequence;
       t.acknowledged = link.tick(n - 1).acknowledged;
     }
-    if (n % 20 == 5) t.acknowledged -= 1;  // and the command before this one was lost
+    if (n % 20 == 5) t.acknowledged -= 1;  // the previous command was lost
     measured.tick(t);
   }
   CHECK(measured.age_s().max_s() == Approx(1.3e-3));
   CHECK(measured.missed_report_fraction() == Approx(0.05).margin(2e-3));
-  CHECK(measured.report_rate_Hz() == Approx(1000.0));  // what is lost was made
+  CHECK(measured.report_rate_Hz() == Approx(1000.0));  // lost reports count for the rate
   CHECK(measured.round_trip_s().max_s() == Approx(1.7e-3));
   CHECK(measured.delay_s() == Approx(3.0e-3).margin(DurationStatistic::kBin_s * 2));
 }
 
-TEST_CASE("one late tick in a thousand does not decide, one in twenty does", "[loop_measurement]") {
+TEST_CASE("one late tick in a thousand does not change the result, one in twenty does",
+          "[loop_measurement]") {
   for (const std::uint64_t every : {1000u, 20u}) {
     LoopMeasurement measured(0.0);
     const Link link;
@@ -112,7 +112,7 @@ TEST_CASE("one late tick in a thousand does not decide, one in twenty does", "[l
   }
 }
 
-TEST_CASE("where nothing is acknowledged the assumption stands, and says so", "[loop_measurement]") {
+TEST_CASE("without acknowledgements the assumed delay is used and marked as assumed", "[loop_measurement]") {
   LoopMeasurement measured(2e-3);
   Link link;
   link.acknowledges = false;
@@ -122,7 +122,7 @@ TEST_CASE("where nothing is acknowledged the assumption stands, and says so", "[
   CHECK(measured.typical_delay_s() == Approx(2.3e-3));
 }
 
-TEST_CASE("a device that restarts or answers nonsense is not measured by it", "[loop_measurement]") {
+TEST_CASE("restarts and invalid acknowledgements do not change the measurement", "[loop_measurement]") {
   LoopMeasurement measured(2e-3);
   Link link;
   for (std::uint64_t n = 0; n < 100; ++n) {
@@ -134,7 +134,7 @@ TEST_CASE("a device that restarts or answers nonsense is not measured by it", "[
   CHECK(measured.round_trip_s().max_s() == Approx(0.7e-3));
 }
 
-TEST_CASE("nothing measured yet is no division by nothing", "[loop_measurement]") {
+TEST_CASE("an empty measurement does not divide by zero", "[loop_measurement]") {
   LoopMeasurement measured(2e-3);
   CHECK(measured.report_rate_Hz() == 0.0);
   CHECK(measured.device_clock_rate() == 1.0);
@@ -147,12 +147,12 @@ TEST_CASE("nothing measured yet is no division by nothing", "[loop_measurement]"
   CHECK(measured.period_s().count() == 0);
 }
 
-TEST_CASE("the statistics of durations are those of the list", "[loop_measurement]") {
+TEST_CASE("the statistics of durations agree with those of the full list", "[loop_measurement]") {
   RandomValues random(5);
   DurationStatistic statistic;
   std::vector<double> list;
   for (int n = 0; n < 5000; ++n) {
-    list.push_back(random.log_uniform(1e-6, 50e-3));  // some beyond the bins
+    list.push_back(random.log_uniform(1e-6, 50e-3));  // some outside of the bins
     statistic.add(list.back());
   }
   std::sort(list.begin(), list.end());

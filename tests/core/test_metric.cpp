@@ -6,22 +6,17 @@
 #include <catch2/catch.hpp>
 
 #include "core/metric.hpp"
+#include "tests/support/pose_matrix.hpp"
 #include "tests/support/random_values.hpp"
 
 using namespace wrenchd;
 using std::numbers::pi;
+using test::matrix;
 using test::RandomValues;
 
 namespace {
 
 using Eigen::Matrix4d;
-
-Matrix4d matrix(const Pose& X) {
-  Matrix4d m = Matrix4d::Identity();
-  m.topLeftCorner<3, 3>() = X.rotation.toRotationMatrix();
-  m.topRightCorner<3, 1>() = X.translation_m;
-  return m;
-}
 
 /// M of Eq. (13).
 Matrix6d generalised(const Inertia& M) {
@@ -31,8 +26,8 @@ Matrix6d generalised(const Inertia& M) {
   return m;
 }
 
-/// V~ of Eq. (12) as it stands, with 4 x 4 matrices:  [V~]^ = exp(-xi^/2) p^-1 (q - p),  xi = log(p^-1 q).
-/// The result is a twist matrix but for rounding; its skew part is read off.
+/// V~ of Eq. (12), literally with 4 x 4 matrices:  [V~]^ = exp(-xi^/2) p^-1 (q - p),  xi = log(p^-1 q).
+/// The result is a twist matrix up to rounding; returns its skew part.
 Vector6d literal_velocity(const Pose& p, const Pose& q) {
   const Vector6d xi = log(inverse(p) * q);
   const Matrix4d V = matrix(exp(-0.5 * xi)) * (matrix(inverse(p)) * (matrix(q) - matrix(p)));
@@ -42,7 +37,7 @@ Vector6d literal_velocity(const Pose& p, const Pose& q) {
   return v;
 }
 
-/// Eq. (8) as it stands, with any 6 x 6 inertia.
+/// Eq. (8), literally with any 6 x 6 inertia.
 double literal_energy(const Matrix6d& M, const Pose& p, const Pose& q) {
   const Vector6d V = literal_velocity(p, q);
   return V.dot(M * V);
@@ -101,7 +96,7 @@ TEST_CASE("T does not depend on the inertial frame: T(ap, aq) = T(p, q)", "[metr
 }
 
 TEST_CASE("T does not depend on the body frame: T(pb, qb) = T(p, q) with M transformed", "[metric]") {
-  // In the frame b the body velocity is Ad_(b^-1) V, so the same energy takes M_b = Ad_b' M Ad_b.
+  // In the frame b the body velocity is Ad_(b^-1) V, so the same energy requires M_b = Ad_b' M Ad_b.
   RandomValues random(4);
   for (int i = 0; i < 10'000; ++i) {
     const auto [M, p, q] = random_case(random);
@@ -112,7 +107,7 @@ TEST_CASE("T does not depend on the body frame: T(pb, qb) = T(p, q) with M trans
   }
 }
 
-TEST_CASE("turning the body axes turns H and leaves T", "[metric]") {
+TEST_CASE("rotating the body axes rotates H and keeps T", "[metric]") {
   RandomValues random(5);
   for (int i = 0; i < 5'000; ++i) {
     const auto [M, p, q] = random_case(random);
@@ -134,12 +129,12 @@ TEST_CASE("all lengths times c: T times c^2 at equal mass", "[metric]") {
   }
 }
 
-TEST_CASE("all lengths times c keeps which of two configurations is nearer", "[metric]") {
+TEST_CASE("scaling all lengths does not change which of two configurations is nearer", "[metric]") {
   RandomValues random(7);
   for (int i = 0; i < 5'000; ++i) {
     const auto [M, p, q] = random_case(random);
     const Pose r = random.pose();
-    const double c = std::ldexp(1.0, random.integer(-20, 20));  // a power of two rounds nothing
+    const double c = std::ldexp(1.0, random.integer(-20, 20));  // a power of two, which is exact
     const auto scaled = [c](const Pose& X) { return with_lengths_times(c, X); };
     const Inertia M_c = with_lengths_times(c, M);
     REQUIRE((energy(M_c, scaled(p), scaled(q)) < energy(M_c, scaled(p), scaled(r))) ==
@@ -160,7 +155,7 @@ TEST_CASE("mass times c: T times c, and no configuration becomes nearer than ano
   }
 }
 
-TEST_CASE("T = 0 if p = q, whichever sign the quaternion has", "[metric]") {
+TEST_CASE("T = 0 if p = q, for both signs of the quaternion", "[metric]") {
   RandomValues random(9);
   for (int i = 0; i < 2'000; ++i) {
     const auto [M, p, q] = random_case(random);
@@ -174,7 +169,7 @@ TEST_CASE("T = 0 if p = q, whichever sign the quaternion has", "[metric]") {
   }
 }
 
-TEST_CASE("T = 0 only if p = q: it is at least that of the least turn and the least shift", "[metric]") {
+TEST_CASE("T = 0 only if p = q: T has a lower bound from rotation and translation", "[metric]") {
   RandomValues random(10);
   for (int i = 0; i < 5'000; ++i) {
     const Inertia M = random.inertia();
@@ -198,7 +193,7 @@ TEST_CASE("T is symmetric: T(p, q) = T(q, p)", "[metric]") {
   }
 }
 
-TEST_CASE("T is exactly quadratic in the shift and the vector part of the quaternion", "[metric]") {
+TEST_CASE("T is exactly quadratic in the translation and the vector part of the quaternion", "[metric]") {
   RandomValues random(12);
   for (int i = 0; i < 5'000; ++i) {
     const Inertia M = random.inertia();

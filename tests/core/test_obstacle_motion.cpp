@@ -24,14 +24,14 @@ double apart(const Pose& a, const Pose& b) {
 
 }  // namespace
 
-TEST_CASE("an obstacle without velocity stands still, to the bit", "[motion]") {
+TEST_CASE("an obstacle without velocity keeps its pose bit for bit", "[motion]") {
   CHECK_FALSE(ObstacleMotion{}.moves());
   CHECK_FALSE(ObstacleMotion{{0, 0, 0}, {0, 0, 0}, 2.0}.moves());
   for (const double t : {-1.0, 0.0, 0.001, 1.0, kDay_s})
     CHECK(same_bits(ObstacleMotion{}.pose_at(kStart, t), kStart));
 }
 
-TEST_CASE("at time 0, before it, and where the time means nothing, every motion is at its start",
+TEST_CASE("at time 0, before it, and at a time that is not finite, every motion is at its start",
           "[motion]") {
   for (const ObstacleMotion& motion : {kStraight, kSpinning, kToAndFro, kFastest}) {
     CHECK(motion.moves());
@@ -41,17 +41,17 @@ TEST_CASE("at time 0, before it, and where the time means nothing, every motion 
   }
 }
 
-TEST_CASE("the origin goes straight, and the body turns about it in the world's axes", "[motion]") {
+TEST_CASE("the origin moves on a line, and the body rotates about it in axes of the world", "[motion]") {
   const Pose X = ObstacleMotion{{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.0}.pose_at(kStart, 0.5);
   CHECK((X.translation_m - Vector3d(0.15, 0.1, -0.15)).norm() < 1e-15);
   const Quaterniond turned = rotation_from({0.5, -1.0, 0.25}) * kStart.rotation;
   CHECK(X.rotation.angularDistance(turned) < 1e-15);
-  // What only goes keeps its rotation to the bit, and what only turns its place.
+  // A pure translation keeps the rotation bit for bit, a pure rotation the position.
   CHECK(kStraight.pose_at(kStart, 0.5).rotation.coeffs() == kStart.rotation.coeffs());
   CHECK(kSpinning.pose_at(kStart, 0.5).translation_m == kStart.translation_m);
 }
 
-TEST_CASE("to and fro: there at the turning points, back at the start, at the same speed all the time",
+TEST_CASE("a periodic motion reverses at its ends, returns to its start, and has constant speed",
           "[motion]") {
   ObstacleMotion for_ever = kToAndFro;
   for_ever.reverse_after_s = 0.0;
@@ -67,14 +67,14 @@ TEST_CASE("to and fro: there at the turning points, back at the start, at the sa
   }
 }
 
-TEST_CASE("days later the pose is finite, of unit norm, and moves on smoothly", "[motion]") {
+TEST_CASE("after days the pose is finite, has unit norm, and changes smoothly", "[motion]") {
   for (const ObstacleMotion& motion : {kStraight, kSpinning, kToAndFro, kFastest}) {
     const double tick_m_rad = 0.001 * (motion.linear_m_per_s.norm() + motion.angular_rad_per_s.norm());
     for (const double t : {1.0, kDay_s, 30 * kDay_s, 10000 * kDay_s}) {
       const Pose X = motion.pose_at(kStart, t);
       CHECK(is_finite(X));
       CHECK(std::abs(X.rotation.norm() - 1.0) < 1e-15);
-      // No faster than it is said to be, but for the digits that the time itself has left.
+      // At most the configured speed, up to the rounding of the time.
       const double rounding = 100.0 * (t * 2.3e-16);
       CHECK(apart(X, motion.pose_at(kStart, t + 0.001)) <= tick_m_rad * (1.0 + 1e-6) + rounding);
     }
@@ -86,8 +86,8 @@ TEST_CASE("days later the pose is finite, of unit norm, and moves on smoothly", 
   }
 }
 
-TEST_CASE("after whole turns it stands as at the start, and its quaternion never leaps", "[motion]") {
-  const ObstacleMotion turn = {{0, 0, 0}, {0, 0, 2.0 * std::numbers::pi}, 0.0};  // one a second
+TEST_CASE("after whole turns the rotation equals the start, and the quaternion is continuous", "[motion]") {
+  const ObstacleMotion turn = {{0, 0, 0}, {0, 0, 2.0 * std::numbers::pi}, 0.0};  // one turn per second
   for (const double t : {1.0, 2.0, 3.0, 1000.0, 86401.0})
     CHECK(apart(turn.pose_at(kStart, t), kStart) < 1e-10);
   Quaterniond last = kStart.rotation;
@@ -98,7 +98,7 @@ TEST_CASE("after whole turns it stands as at the start, and its quaternion never
   }
 }
 
-TEST_CASE("a motion between two poses sets out when it is to, arrives, and stands there", "[motion]") {
+TEST_CASE("a motion between two poses starts at its time, arrives, and stops", "[motion]") {
   const Pose X_to = {rotation_from({0.3, -0.2, 1.0}) * kStart.rotation, {1.0, -2.0, 0.5}};
   const ObstacleMotion motion = ObstacleMotion::between(kStart, X_to, 7.0, 2.5);
   for (const double t : {-1.0, 0.0, 6.999, 7.0}) CHECK(same_bits(motion.pose_at(kStart, t), kStart));
@@ -110,7 +110,7 @@ TEST_CASE("a motion between two poses sets out when it is to, arrives, and stand
     CHECK(apart(motion.pose_at(kStart, t), motion.pose_at(kStart, t + 0.01)) <= 0.01 * speed * (1.0 + 1e-9));
 }
 
-TEST_CASE("to and fro goes by the time since it set out", "[motion]") {
+TEST_CASE("a periodic motion depends on the time since its start", "[motion]") {
   ObstacleMotion later = kToAndFro;
   later.start_s = 3.0;
   for (const double t : {3.0, 3.5, 4.25, 6.0, 10.5})

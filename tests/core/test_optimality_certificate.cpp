@@ -75,7 +75,7 @@ TEST_CASE("no rotation has a lower Lagrangian than the dual rotation", "[certifi
   }
 }
 
-TEST_CASE("contacts without a positive multiplier do not count in the certificate", "[certificate]") {
+TEST_CASE("contacts without a positive multiplier have no effect on the certificate", "[certificate]") {
   RandomValues random(223);
   Case c = random_case(random);
   const Eigen::Matrix4d Z = dual_matrix(c.H_hat, c.contacts, c.multipliers);

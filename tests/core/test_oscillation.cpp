@@ -18,15 +18,15 @@ namespace {
 
 constexpr double kTick_s = 1e-3;
 
-/// A handle in a hand, against a wall z < 0 of this stiffness that answers `delay` ticks late. What happens
-/// at each tick goes to a detector. The velocity comes in the steps of an encoder.
+/// A handle held by a hand, in contact with a wall z < 0 of this stiffness with a delay of `delay` ticks. The
+/// detector receives each tick. The velocity is quantised by an encoder.
 struct OnWall {
   double stiffness_N_per_m = 1000.0;
   std::size_t delay = 0;
   SimulationSettings hand{};
   double quantum_m = 10e-6;
 
-  /// goal: height of the hand's goal over time. Returns when the detector fired, below 0 where it did not.
+  /// goal: height of the hand's goal over time. Returns the detection time; below 0 without a detection.
   template <class Goal>
   double fired_s(double seconds, const Goal& goal) {
     constexpr int kSubsteps = 16;
@@ -62,8 +62,8 @@ struct OnWall {
     }
     return -1.0;
   }
-  bool touched = false;         ///< the wall
-  double swings_from_s = -1.0;  ///< where the first swing of 0.3 mm within 25 ms began
+  bool touched = false;         ///< true if the handle touched the wall
+  double swings_from_s = -1.0;  ///< start of the first swing of 0.3 mm within 25 ms
 };
 
 /// A wave along one axis of motion against a force of the opposite sign.
@@ -82,7 +82,7 @@ bool fires(double amplitude, double Hz, double seconds, int axis, double work_fo
 
 }  // namespace
 
-TEST_CASE("a limit cycle on a wall that is too stiff is seen within 50 ms", "[oscillation]") {
+TEST_CASE("a limit cycle at a wall that is too stiff is detected within 50 ms", "[oscillation]") {
   for (const double stiffness : {6000.0, 7000.0, 8000.0}) {  // 35 Hz and more
     OnWall wall;
     wall.stiffness_N_per_m = stiffness;
@@ -91,7 +91,7 @@ TEST_CASE("a limit cycle on a wall that is too stiff is seen within 50 ms", "[os
     wall.hand.hand_damping_N_s_per_m = 2.0;
     wall.hand.handle_mass_kg = 0.08;
     INFO(stiffness << " N/m");
-    // Leant on, with 12 N at last.
+    // A force that grows to 12 N.
     const double fired = wall.fired_s(2.0, [](double t) { return std::max(-0.015, 0.001 - 0.05 * t); });
     REQUIRE(fired > 0.0);
     REQUIRE(wall.swings_from_s > 0.0);
@@ -99,7 +99,7 @@ TEST_CASE("a limit cycle on a wall that is too stiff is seen within 50 ms", "[os
   }
 }
 
-TEST_CASE("a hard tap is no oscillation", "[oscillation]") {
+TEST_CASE("a hard tap is not an oscillation", "[oscillation]") {
   for (const double stiffness : {300.0, 800.0}) {
     for (const double depth_m : {0.005, 0.015, 0.03}) {
       OnWall wall;
@@ -107,13 +107,14 @@ TEST_CASE("a hard tap is no oscillation", "[oscillation]") {
       wall.hand.hand_stiffness_N_per_m = 800.0;
       INFO(stiffness << " N/m, " << depth_m << " m");
       CHECK(wall.fired_s(1.5, [&](double t) { return t > 0.1 && t < 0.16 ? -depth_m : 0.02; }) < 0.0);
-      CHECK(wall.fired_s(1.5, [&](double t) { return t > 0.1 ? -depth_m : 0.02; }) < 0.0);  // and stays
+      CHECK(wall.fired_s(1.5, [&](double t) { return t > 0.1 ? -depth_m : 0.02; }) <
+            0.0);  // stays in contact
       CHECK(wall.touched);
     }
   }
 }
 
-TEST_CASE("a tremor is no oscillation", "[oscillation]") {
+TEST_CASE("a tremor is not an oscillation", "[oscillation]") {
   for (const double Hz : {4.0, 8.0, 10.0, 12.0}) {
     INFO(Hz << " Hz");
     OnWall wall;
@@ -125,9 +126,9 @@ TEST_CASE("a tremor is no oscillation", "[oscillation]") {
   }
 }
 
-TEST_CASE("sliding over the faces of a mesh is no oscillation", "[oscillation]") {
-  // A drum of flat faces 4 mm wide: at 0.2 m/s the normal jumps fifty times a second, and the handle follows
-  // the corners up and down by the sagitta, 0.1 mm.
+TEST_CASE("sliding over the faces of a mesh is not an oscillation", "[oscillation]") {
+  // A drum of flat faces 4 mm wide: at 0.2 m/s the normal jumps 50 times per second, and the handle follows
+  // the corners by the sagitta of 0.1 mm.
   OscillationDetector detector;
   constexpr double kFace_m = 0.004, kSagitta_m = 1e-4, kSpeed_m_per_s = 0.2;
   double last_m = 0.0;
@@ -143,22 +144,22 @@ TEST_CASE("sliding over the faces of a mesh is no oscillation", "[oscillation]")
   CHECK_FALSE(detector.oscillates());
 }
 
-TEST_CASE("what swings between 20 and 400 Hz is seen along and about each axis", "[oscillation]") {
+TEST_CASE("oscillations between 20 and 400 Hz are detected along and about each axis", "[oscillation]") {
   for (int axis = 0; axis < 6; ++axis) {
     const double lever_m = axis < 3 ? 1.0 : 0.05;
     for (const double Hz : {24.0, 50.0, 100.0, 300.0}) {
       INFO("axis " << axis << ", " << Hz << " Hz");
       CHECK(fires(5e-4 / lever_m, Hz, 3.0 / Hz, axis, 2.0 * lever_m));
-      CHECK_FALSE(fires(0.5e-4 / lever_m, Hz, 1.0, axis, 2.0 * lever_m));  // an encoder's step
-      CHECK_FALSE(fires(5e-4 / lever_m, Hz, 1.0, axis, 0.0));              // the motors have no part in it
-      CHECK_FALSE(fires(5e-4 / lever_m, Hz, 1.0, axis, 2.0 * lever_m, false));  // through the air
+      CHECK_FALSE(fires(0.5e-4 / lever_m, Hz, 1.0, axis, 2.0 * lever_m));       // one encoder step
+      CHECK_FALSE(fires(5e-4 / lever_m, Hz, 1.0, axis, 0.0));                   // without force of the motors
+      CHECK_FALSE(fires(5e-4 / lever_m, Hz, 1.0, axis, 2.0 * lever_m, false));  // without contact
     }
     CHECK_FALSE(fires(5e-4 / lever_m, 18.0, 1.0, axis, 2.0 * lever_m));
     CHECK_FALSE(fires(5e-4 / lever_m, 480.0, 1.0, axis, 2.0 * lever_m));
   }
 }
 
-TEST_CASE("what dies away is no oscillation, and what was seen can be forgotten", "[oscillation]") {
+TEST_CASE("a decaying motion is not an oscillation, and the detector can be reset", "[oscillation]") {
   for (const double kept : {0.7, 1.0}) {
     OscillationDetector detector;
     double amplitude_m = 5e-3;
@@ -175,7 +176,7 @@ TEST_CASE("what dies away is no oscillation, and what was seen can be forgotten"
   }
 }
 
-TEST_CASE("what is not finite is not looked at", "[oscillation]") {
+TEST_CASE("the detector ignores values that are not finite", "[oscillation]") {
   OscillationDetector detector;
   detector.update({{std::nan(""), 0.0, 0.0}, Vector3d::Zero()}, {}, kTick_s, true);
   detector.update({}, {{std::nan(""), 0.0, 0.0}, Vector3d::Zero()}, kTick_s, true);
@@ -184,7 +185,7 @@ TEST_CASE("what is not finite is not looked at", "[oscillation]") {
   CHECK_FALSE(detector.oscillates());
 }
 
-TEST_CASE("looking for oscillation allocates nothing", "[oscillation][rt]") {
+TEST_CASE("the detector allocates nothing", "[oscillation][rt]") {
   OscillationDetector detector;
   const test::RealtimeGuard guard;
   for (int n = 0; n < 1000; ++n)

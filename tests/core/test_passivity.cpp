@@ -36,11 +36,11 @@ Wrench along_x(double f_N) {
   return {{f_N, 0.0, 0.0}, Vector3d::Zero()};
 }
 
-/// A handle that taps a wall at x < 0 whose wrench comes `delay` ticks late, with or without a guard.
+/// A handle that taps a wall at x < 0 with a delay of `delay` ticks, with or without a guard.
 struct Tapped {
-  double net_J = 0.0;       ///< the most that the motors gave, net of the device's friction
-  double injected_J = 0.0;  ///< as the guard saw it
-  double asked_N = 0.0;     ///< the most
+  double net_J = 0.0;       ///< largest energy of the motors minus the device's friction
+  double injected_J = 0.0;  ///< largest energy that the guard computed
+  double asked_N = 0.0;     ///< largest requested force
   bool acted = false;
   bool out_of_hand = false;
 };
@@ -54,7 +54,7 @@ Tapped tap(double K_N_per_m, std::size_t delay, bool guarded, double speed_m_per
   s.actuator_max_force_N = 1000.0;
   SimulatedHandle handle(s, at_x(1e-9), kTick_s / kSubsteps);
   for (int i = 0; handle.V_BH().linear_m_per_s.x() > -speed_m_per_s && i < 10000; ++i) {
-    handle.step({at_x(-1000.0), {}}, {});  // a blow
+    handle.step({at_x(-1000.0), {}}, {});  // an impact
     if (handle.X_BH().translation_m.x() < 0.0) handle.step({at_x(0.0), {}}, {});
   }
   PassivityGuard guard(kDevice, with_delay(delay));
@@ -82,7 +82,7 @@ Tapped tap(double K_N_per_m, std::size_t delay, bool guarded, double speed_m_per
 
 }  // namespace
 
-TEST_CASE("the guard's account is work done by the wrench that acted", "[passivity]") {
+TEST_CASE("the guard integrates the work of the wrench that acted", "[passivity]") {
   for (const std::size_t delay : {0u, 1u, 3u, 48u}) {
     INFO("delay " << delay);
     RandomValues random(21);
@@ -103,7 +103,7 @@ TEST_CASE("the guard's account is work done by the wrench that acted", "[passivi
       }
       const Wrench asked = random.wrench();
       guard.limit(asked, X, kTick_s, false);
-      // What the limits made of it is what counts.
+      // The guard must use the wrench after the limits.
       sent.push_back({0.5 * asked.force_N, 0.5 * asked.torque_Nm});
       guard.record_sent(sent.back());
     }
@@ -113,12 +113,12 @@ TEST_CASE("the guard's account is work done by the wrench that acted", "[passivi
   }
 }
 
-TEST_CASE("a spring that gives back what it took is left alone", "[passivity]") {
+TEST_CASE("the guard does not change a passive spring", "[passivity]") {
   PassivityGuard guard(kFrictionless, with_delay(0));
   constexpr double K = 500.0;
   double x = 0.0;
   for (int n = 0; n <= 2000; ++n) {
-    // The mean force over each interval, so that the account is exact to rounding.
+    // The mean force of each interval, so that the energy is exact up to rounding.
     const double next =
         -0.01 * std::sin(3.14159265358979 * (n + 1) / 1000.0) * std::sin(3.14159265358979 * (n + 1) / 1000.0);
     const Wrench asked = along_x(-0.5 * K * (x + next));
@@ -131,13 +131,13 @@ TEST_CASE("a spring that gives back what it took is left alone", "[passivity]") 
   CHECK(guard.injected_J() < 1e-9);
 }
 
-TEST_CASE("a force that pushes along is damped, then cut to nothing", "[passivity]") {
+TEST_CASE("an active force is damped, then scaled to zero", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
   double x = 0.0, scaling_end_J = 0.0;
   Wrench out;
   for (int n = 0; n < 500; ++n) {
     out = guard.limit(along_x(2.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
-    if (out.force_N.x() > 0.0) x += 0.1 * kTick_s;  // the hand follows where it is pushed
+    if (out.force_N.x() > 0.0) x += 0.1 * kTick_s;  // the hand follows the force
     scaling_end_J = std::max(scaling_end_J, guard.injected_J());
   }
   CHECK(guard.intervened());
@@ -147,7 +147,8 @@ TEST_CASE("a force that pushes along is damped, then cut to nothing", "[passivit
   CHECK_FALSE(guard.energy_runaway());
 }
 
-TEST_CASE("what is earned in one contact does not pay for the next, and debts stay", "[passivity]") {
+TEST_CASE("energy absorbed in one contact gives no credit in the next, and a deficit remains",
+          "[passivity]") {
   PassivityGuard guard(kFrictionless, with_delay(0));
   double x = 0.0;
   double dt_s = 0.0;
@@ -157,11 +158,11 @@ TEST_CASE("what is earned in one contact does not pay for the next, and debts st
     dt_s = kTick_s;
     return out;
   };
-  for (int n = 0; n < 20; ++n) push(5.0, -1e-3, true);  // the hand pays 0.1 J
+  for (int n = 0; n < 20; ++n) push(5.0, -1e-3, true);  // the hand does work of 0.1 J
   for (int n = 0; n < 3; ++n) push(0.0, 0.0, false);
   for (int n = 0; n < 4; ++n) push(1.0, 0.25e-3, true);
   push(0.0, 0.0, false);
-  CHECK(guard.injected_J() > 0.5e-3);  // and nobody paid for that
+  CHECK(guard.injected_J() > 0.5e-3);  // the guard counts it as generated
   const double debt_J = guard.injected_J();
   for (int n = 0; n < 3; ++n) push(0.0, 0.0, false);
   CHECK(guard.injected_J() <= debt_J);
@@ -173,15 +174,15 @@ TEST_CASE("what is earned in one contact does not pay for the next, and debts st
   CHECK(push(1.0, 0.0, true).force_N.x() == 1.0);
 }
 
-TEST_CASE("a wall three times too stiff gives far less through the guard", "[passivity]") {
-  // At 4 ms of delay 0.5 N.s/m bear 111 N/m.
+TEST_CASE("with the guard a wall three times too stiff returns far less energy", "[passivity]") {
+  // At a delay of 4 ms and 0.5 N.s/m the bound is 111 N/m.
   const Tapped bare = tap(333.0, 4, false, 0.5), guarded = tap(333.0, 4, true, 0.5);
   CHECK(bare.net_J > 3e-3);
   CHECK(guarded.net_J < bare.net_J / 3.0);
   CHECK(guarded.acted);
 }
 
-TEST_CASE("a wall within the bound is not touched by the guard", "[passivity]") {
+TEST_CASE("the guard does not change a wall within the stability bound", "[passivity]") {
   for (const double speed : {0.05, 0.2, 0.5}) {
     const Tapped tapped = tap(100.0, 4, true, speed);
     INFO("at " << speed << " m/s");
@@ -192,14 +193,14 @@ TEST_CASE("a wall within the bound is not touched by the guard", "[passivity]") 
   }
 }
 
-TEST_CASE("20 mJ from nowhere within 100 ms are out of hand, within a second they are not", "[passivity]") {
+TEST_CASE("20 mJ generated within 100 ms are a fault, within 1 s they are not", "[passivity]") {
   for (const double watts : {0.4, 0.1}) {
     PassivityGuard guard(kFrictionless, with_delay(0));
     double x = 0.0;
     bool out_of_hand = false;
     for (int n = 0; n < 300; ++n) {
       guard.limit(along_x(1.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
-      guard.record_sent(along_x(1.0));  // somebody sends it all the same
+      guard.record_sent(along_x(1.0));  // the unscaled force is sent nevertheless
       x += watts * kTick_s;
       out_of_hand = out_of_hand || guard.energy_runaway();
     }
@@ -208,7 +209,7 @@ TEST_CASE("20 mJ from nowhere within 100 ms are out of hand, within a second the
   }
 }
 
-TEST_CASE("letting go of a pressed spring is not out of hand", "[passivity]") {
+TEST_CASE("releasing a compressed spring is not a fault", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
   double x = 0.0;
   for (int n = 0; n < 100; ++n) {
@@ -223,7 +224,7 @@ TEST_CASE("letting go of a pressed spring is not out of hand", "[passivity]") {
   CHECK(guard.energy_out_J() > 40e-3);
 }
 
-TEST_CASE("the guard's damping is never more than the device's own, nor than its cap", "[passivity]") {
+TEST_CASE("the guard's damping exceeds neither the device's damping nor its maximum", "[passivity]") {
   for (const double cap : {1e9, 0.1, 0.0}) {
     PassivityLimits caps = with_delay(0);
     caps.damping_N_s_per_m = cap;
@@ -245,7 +246,7 @@ TEST_CASE("the guard's damping is never more than the device's own, nor than its
   }
 }
 
-TEST_CASE("a sample that is missed is made up for by the next", "[passivity]") {
+TEST_CASE("the next sample makes up for a missed one", "[passivity]") {
   PassivityGuard guard(kFrictionless, with_delay(0));
   double x = 0.0;
   for (int n = 0; n < 100; ++n) {
@@ -259,7 +260,7 @@ TEST_CASE("a sample that is missed is made up for by the next", "[passivity]") {
   CHECK(guard.energy_out_J() == Approx(2.0 * 99e-4).epsilon(1e-9));
 }
 
-TEST_CASE("what is not finite neither harms the guard nor is hidden by it", "[passivity]") {
+TEST_CASE("values that are not finite neither change the guard nor are hidden by it", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
   guard.limit({}, at_x(0.0), 0.0, true);
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -271,17 +272,17 @@ TEST_CASE("what is not finite neither harms the guard nor is hidden by it", "[pa
   CHECK(guard.energy_out_J() == 0.0);
 }
 
-TEST_CASE("the guard refuses caps that cannot be", "[passivity]") {
-  const auto refused = [](const std::function<void(PassivityLimits&)>& spoil) {
+TEST_CASE("the guard rejects invalid limits", "[passivity]") {
+  const auto rejected = [](const std::function<void(PassivityLimits&)>& spoil) {
     PassivityLimits caps;
     spoil(caps);
     CHECK_THROWS_AS(PassivityGuard(kDevice, caps), std::invalid_argument);
   };
-  refused([](auto& c) { c.damping_N_s_per_m = -1.0; });
-  refused([](auto& c) { c.damping_Nm_s_per_rad = std::nan(""); });
-  refused([](auto& c) { c.scaling_end_J = c.scaling_start_J; });
-  refused([](auto& c) { c.scaling_start_J = -1.0; });
-  refused([](auto& c) { c.delay_ticks = PassivityGuard::kMaxDelay_ticks + 1; });
+  rejected([](auto& c) { c.damping_N_s_per_m = -1.0; });
+  rejected([](auto& c) { c.damping_Nm_s_per_rad = std::nan(""); });
+  rejected([](auto& c) { c.scaling_end_J = c.scaling_start_J; });
+  rejected([](auto& c) { c.scaling_start_J = -1.0; });
+  rejected([](auto& c) { c.delay_ticks = PassivityGuard::kMaxDelay_ticks + 1; });
 }
 
 TEST_CASE("the guard allocates nothing", "[passivity][rt]") {
@@ -311,7 +312,7 @@ TEST_CASE("the wrench is scaled by the energy delivered and the energy under way
       guard.record_sent(along_x(kForce_N));
       if (n > delay) net_J += kForce_N * kStep_m;  // the first wrench acts in the interval after the delay
       if (n > 0) net_J = std::max(net_J - PassivityGuard::kEnergyLeak_W * kTick_s, 0.0);
-      if (n < 2) continue;  // the speed is known from two steps on
+      if (n < 2) continue;  // the speed is known after two steps
       const double under_way_J = kForce_N * kStep_m * static_cast<double>(std::min(n, delay));
       const double share =
           (net_J + under_way_J - limits.scaling_start_J) / (limits.scaling_end_J - limits.scaling_start_J);
@@ -322,8 +323,7 @@ TEST_CASE("the wrench is scaled by the energy delivered and the energy under way
   }
 }
 
-TEST_CASE("the guard's damping takes the energy back within a tick, in force and torque alike",
-          "[passivity]") {
+TEST_CASE("the guard's damping dissipates the energy within a tick, in force and torque", "[passivity]") {
   PassivityLimits limits = with_delay(0);
   limits.scaling_start_J = 1.0;  // damping only
   limits.scaling_end_J = 2.0;
@@ -351,11 +351,11 @@ TEST_CASE("the guard's damping takes the energy back within a tick, in force and
       const double brake = turning ? added.torque_Nm.y() : added.force_N.x();
       CHECK(brake == Approx(-alpha * b * speed).epsilon(1e-6).margin(1e-12));
     }
-    CHECK(alpha == 1.0);  // capped by the device's own friction in the end
+    CHECK(alpha == 1.0);  // finally limited by the device's own friction
   }
 }
 
-TEST_CASE("energy from nowhere leaks away by a milliwatt, and no debt is made of it", "[passivity]") {
+TEST_CASE("generated energy decays by 1 mW, but not below zero", "[passivity]") {
   PassivityGuard guard(kFrictionless, with_delay(0));
   double x = 0.0;
   for (int n = 0; n < 5; ++n, x += 1e-4) {
@@ -378,11 +378,11 @@ TEST_CASE("energy from nowhere leaks away by a milliwatt, and no debt is made of
   CHECK(guard.injected_J() == 0.0);
 }
 
-TEST_CASE("credit for obstacles that move: pushing gives rights, withdrawing takes them and makes no debt",
+TEST_CASE("work of moving obstacles: pushing adds credit; withdrawing removes it, but not below zero",
           "[passivity]") {
   PassivityGuard guard(kFrictionless, with_delay(0));
   double x = 0.0;
-  const auto push = [&](double f_N, double step_m) {  // the energy that is then from nowhere
+  const auto push = [&](double f_N, double step_m) {  // returns the generated energy
     guard.limit(along_x(f_N), at_x(x), kTick_s, true);
     guard.record_sent(along_x(f_N));
     x += step_m;
@@ -392,15 +392,15 @@ TEST_CASE("credit for obstacles that move: pushing gives rights, withdrawing tak
   };
   push(0.0, 0.0);
   guard.credit_obstacle_work(5e-3);
-  CHECK(push(1.0, 4e-3) == 0.0);  // 4 mJ of the 5 that the obstacle gave
+  CHECK(push(1.0, 4e-3) == 0.0);  // 4 mJ of the credit of 5 mJ
   guard.credit_obstacle_work(-0.5e-3);
-  CHECK(push(1.0, 1e-3) == Approx(0.5e-3).epsilon(0.01));  // 0.5 mJ were left
+  CHECK(push(1.0, 1e-3) == Approx(0.5e-3).epsilon(0.01));  // 0.5 mJ remained
   const double debt_J = guard.injected_J();
   guard.credit_obstacle_work(-1.0);
   CHECK(guard.injected_J() == debt_J);
   guard.credit(10e-3);
   CHECK(guard.injected_J() == 0.0);
-  guard.credit_obstacle_work(-1.0);  // more than there is: nothing is left, and no debt
+  guard.credit_obstacle_work(-1.0);  // more than the credit: it becomes zero, not negative
   CHECK(guard.injected_J() == 0.0);
   CHECK(push(1.0, 1e-3) == Approx(1e-3).epsilon(0.01));
   guard.credit(-1.0);

@@ -17,14 +17,14 @@ using std::numbers::pi;
 
 namespace {
 
-/// Eq. (22) with phi = 0: what is minimised.
+/// Eq. (22) with phi = 0: the minimised energy.
 double energy_at(const PlanarSection& s, double theta) {
   const double beta = -s.vx * std::sin(theta) - s.vy * std::cos(theta);
   const double half = std::sin(0.5 * theta);
   return s.m * (beta - s.h) * (beta - s.h) + 4.0 * s.H * half * half;
 }
 
-/// The least energy on a grid over all angles allowed.
+/// Returns the least energy on a grid over all admissible angles.
 double scanned(const PlanarSection& s, int steps = 400) {
   double least = energy_at(s, s.theta_min);
   for (int i = 1; i <= steps; ++i)
@@ -94,7 +94,7 @@ Pressed random_pressed(RandomValues& random) {
   return c;
 }
 
-/// No multiple of 1.8 degrees about any axis of the family frees the whole body for less.
+/// Checks that no multiple of 1.8 degrees about an axis of the family is admissible with less energy.
 void require_least_of_free(const Pressed& c, const PlanarFamily& family) {
   const auto free = [&c](const Pose& X_WQ) {
     return std::all_of(
@@ -131,7 +131,7 @@ void require_section_free(const Pressed& c, const PlanarFamily::InPlane& solutio
   }
 }
 
-/// The cube of example 4.1 as a section: v in axes with the obstacle's normal as y, as it stands at p.
+/// The cube of example 4.1 as a section: v at p, in axes with the obstacle's normal as y.
 PlanarSection example(double scale) {
   constexpr double kPhi = -0.2;
   const double a = 25.0 * scale;
@@ -157,7 +157,7 @@ TEST_CASE("example 4.1 in the plane", "[planar_family]") {
   CHECK(found.beta == Approx(27.0712157435851).epsilon(1e-14));
   CHECK(found.T == Approx(9.63154218539309).epsilon(1e-13));
   CHECK(std::tan(0.5 * (found.theta - 0.2)) ==
-        Approx(-0.04338450).epsilon(1e-7));  // the root the paper's quartic has
+        Approx(-0.04338450).epsilon(1e-7));  // root of the paper's quartic
 }
 
 TEST_CASE("example 4.1 at ten times the size: the same rotation, a hundred times the energy",
@@ -169,12 +169,13 @@ TEST_CASE("example 4.1 at ten times the size: the same rotation, a hundred times
   CHECK(ten.T == Approx(963.154218539308).epsilon(1e-13));
 }
 
-TEST_CASE("no angle of a section has less energy than the one found", "[planar_family]") {
+TEST_CASE("no angle of a section has less energy than the result", "[planar_family]") {
   RandomValues random(1);
   for (int i = 0; i < 3'000; ++i) require_least(random_section(random));
 }
 
-TEST_CASE("nor where the vertex is exactly or nearly below the centre of mass", "[planar_family]") {
+TEST_CASE("the result is optimal with the vertex exactly or nearly below the centre of mass",
+          "[planar_family]") {
   RandomValues random(2);
   for (int i = 0; i < 2'000; ++i) {
     PlanarSection s = random_section(random);
@@ -184,7 +185,8 @@ TEST_CASE("nor where the vertex is exactly or nearly below the centre of mass", 
   }
 }
 
-TEST_CASE("nor where the vertex is exactly or nearly beside the centre of mass", "[planar_family]") {
+TEST_CASE("the result is optimal with the vertex exactly or nearly beside the centre of mass",
+          "[planar_family]") {
   RandomValues random(3);
   for (int i = 0; i < 2'000; ++i) {
     PlanarSection s = random_section(random);
@@ -193,7 +195,8 @@ TEST_CASE("nor where the vertex is exactly or nearly beside the centre of mass",
   }
 }
 
-TEST_CASE("nor where the vertex touches exactly or nearly, from either side", "[planar_family]") {
+TEST_CASE("the result is optimal with the vertex exactly or nearly in contact, from either side",
+          "[planar_family]") {
   RandomValues random(4);
   for (int i = 0; i < 2'000; ++i) {
     PlanarSection s = random_section(random);
@@ -203,7 +206,7 @@ TEST_CASE("nor where the vertex touches exactly or nearly, from either side", "[
   }
 }
 
-TEST_CASE("nor with a tiny or huge moment of inertia", "[planar_family]") {
+TEST_CASE("the result is optimal for a tiny or huge moment of inertia", "[planar_family]") {
   RandomValues random(5);
   for (int i = 0; i < 3'000; ++i) {
     PlanarSection s = random_section(random);
@@ -212,7 +215,7 @@ TEST_CASE("nor with a tiny or huge moment of inertia", "[planar_family]") {
   }
 }
 
-TEST_CASE("nor at any size", "[planar_family]") {
+TEST_CASE("the result is optimal at any size", "[planar_family]") {
   RandomValues random(6);
   for (int i = 0; i < 2'000; ++i) {
     PlanarSection s = random_section(random);
@@ -238,7 +241,7 @@ TEST_CASE("a vertex that just touches needs no motion", "[planar_family]") {
   }
 }
 
-TEST_CASE("no room to turn: translation along the normal", "[planar_family]") {
+TEST_CASE("without room to rotate the result is a translation along the normal", "[planar_family]") {
   RandomValues random(8);
   for (int i = 0; i < 1'000; ++i) {
     PlanarSection s = random_section(random);
@@ -250,12 +253,12 @@ TEST_CASE("no room to turn: translation along the normal", "[planar_family]") {
   }
 }
 
-TEST_CASE("mass scales the energy of a section and moves nothing", "[planar_family]") {
+TEST_CASE("the mass scales the energy of a section and does not change the pose", "[planar_family]") {
   RandomValues random(9);
   for (int i = 0; i < 1'000; ++i) {
     PlanarSection s = random_section(random);
     const PlanarMinimum before = minimise(s);
-    const double c = std::ldexp(1.0, random.integer(-10, 10));  // a power of two rounds nothing
+    const double c = std::ldexp(1.0, random.integer(-10, 10));  // a power of two, which is exact
     s.m *= c;
     s.H *= c;
     const PlanarMinimum after = minimise(s);
@@ -265,7 +268,7 @@ TEST_CASE("mass scales the energy of a section and moves nothing", "[planar_fami
   }
 }
 
-TEST_CASE("the mirror image of a section turns the other way", "[planar_family]") {
+TEST_CASE("the mirror image of a section rotates in the opposite direction", "[planar_family]") {
   RandomValues random(10);
   for (int i = 0; i < 1'000; ++i) {
     PlanarSection s = random_section(random);
@@ -281,8 +284,7 @@ TEST_CASE("the mirror image of a section turns the other way", "[planar_family]"
   }
 }
 
-TEST_CASE("the pose of every plane puts the vertex on the face, and has the energy that was minimised",
-          "[planar_family]") {
+TEST_CASE("the pose of every plane has the vertex on the face and the minimised energy", "[planar_family]") {
   RandomValues random(11);
   for (int i = 0; i < 100; ++i) {
     const Pressed c = random_pressed(random);
@@ -303,9 +305,8 @@ TEST_CASE("the pose of every plane puts the vertex on the face, and has the ener
   }
 }
 
-TEST_CASE("no rotation of a plane's family that frees the whole body has less energy", "[planar_family]") {
-  // What Algorithm 2 leaves out are angles at which an edge of the cross-section, and so the body, is below
-  // the face.
+TEST_CASE("no admissible rotation about a plane's axis has less energy", "[planar_family]") {
+  // Algorithm 2 omits angles at which an edge of the cross-section, and so the body, is below the face.
   RandomValues random(12);
   for (int i = 0; i < 40; ++i) {
     const Pressed c = random_pressed(random);
@@ -313,7 +314,7 @@ TEST_CASE("no rotation of a plane's family that frees the whole body has less en
   }
 }
 
-TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on either side of half a turn",
+TEST_CASE("the same holds at a vertex that is not the deepest, with angles on both sides of half a turn",
           "[planar_family]") {
   RandomValues random(16);
   int beyond_quarter = 0;
@@ -333,10 +334,10 @@ TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on 
       beyond_quarter += std::abs(theta) > 0.5 * pi ? 1 : 0;
     }
   }
-  REQUIRE(beyond_quarter > 20);  // or nothing was asked
+  REQUIRE(beyond_quarter > 20);  // otherwise the test is empty
 }
 
-TEST_CASE("what the planes of a contact share is the same for one plane alone", "[planar_family]") {
+TEST_CASE("one plane alone gives the same values as all planes of a contact together", "[planar_family]") {
   RandomValues random(17);
   const Pressed c = random_pressed(random);
   const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 47);
@@ -351,7 +352,7 @@ TEST_CASE("what the planes of a contact share is the same for one plane alone", 
   }
 }
 
-TEST_CASE("the energy of a shallow contact keeps its digits", "[planar_family]") {
+TEST_CASE("the energy of a shallow contact is accurate", "[planar_family]") {
   // To first order the vertex has the compliance  1/m + vx^2/H  along the normal:  T = depth^2 / (1/m +
   // vx^2/H).
   RandomValues random(18);
@@ -370,7 +371,7 @@ TEST_CASE("the energy of a shallow contact keeps its digits", "[planar_family]")
   }
 }
 
-TEST_CASE("planar is never better than exact and never worse than translation, however many planes",
+TEST_CASE("planar is never better than exact and never worse than translation, for any number of planes",
           "[planar_family]") {
   RandomValues random(13);
   for (int i = 0; i < 60; ++i) {
@@ -391,7 +392,7 @@ TEST_CASE("planar is never better than exact and never worse than translation, h
   }
 }
 
-TEST_CASE("more planes that contain the fewer never have a higher least energy", "[planar_family]") {
+TEST_CASE("adding planes never increases the least energy", "[planar_family]") {
   RandomValues random(15);
   for (int i = 0; i < 60; ++i) {
     const Pressed c = random_pressed(random);
@@ -406,7 +407,7 @@ TEST_CASE("more planes that contain the fewer never have a higher least energy",
   }
 }
 
-TEST_CASE("a shift of the world changes nothing in the family", "[planar_family]") {
+TEST_CASE("a translation of the world changes no result of the family", "[planar_family]") {
   RandomValues random(14);
   for (int i = 0; i < 50; ++i) {
     const Pressed c = random_pressed(random);

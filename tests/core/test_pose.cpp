@@ -7,22 +7,17 @@
 #include <catch2/catch.hpp>
 
 #include "core/pose.hpp"
+#include "tests/support/pose_matrix.hpp"
 #include "tests/support/random_values.hpp"
 
 using namespace wrenchd;
 using std::numbers::pi;
+using test::matrix;
 using test::RandomValues;
 
 namespace {
 
 using Eigen::Matrix4d;
-
-Matrix4d matrix(const Pose& X) {
-  Matrix4d m = Matrix4d::Identity();
-  m.topLeftCorner<3, 3>() = X.rotation.toRotationMatrix();
-  m.topRightCorner<3, 1>() = X.translation_m;
-  return m;
-}
 
 /// xi^ of Eq. (4).
 Matrix4d twist_matrix(const Vector6d& xi) {
@@ -32,7 +27,7 @@ Matrix4d twist_matrix(const Vector6d& xi) {
   return m;
 }
 
-/// The matrix exponential, from its series alone: scaled until short, summed, squared back.
+/// The matrix exponential by its series with scaling and squaring.
 Matrix4d matrix_exponential(const Matrix4d& m) {
   const double length = m.cwiseAbs().rowwise().sum().maxCoeff();
   const int squarings = std::max(0, static_cast<int>(std::ceil(std::log2(4.0 * length))));
@@ -59,7 +54,7 @@ Vector6d turning(const Vector3d& v, const Vector3d& w) {
 
 }  // namespace
 
-TEST_CASE("exp and log of nothing are nothing", "[pose]") {
+TEST_CASE("exp and log of zero are the identity and zero", "[pose]") {
   const Pose identity = exp(Vector6d::Zero());
   CHECK(identity.rotation.coeffs() == Quaterniond::Identity().coeffs());
   CHECK(identity.translation_m == Vector3d::Zero());
@@ -82,7 +77,7 @@ TEST_CASE("exp undoes log over random poses", "[pose]") {
   }
 }
 
-TEST_CASE("log undoes exp to the last digits for angles down to nothing", "[pose]") {
+TEST_CASE("log undoes exp to rounding for angles down to zero", "[pose]") {
   RandomValues random(3);
   for (int decade = -320; decade <= 0; ++decade) {
     const double angle = std::pow(10.0, decade);
@@ -90,13 +85,13 @@ TEST_CASE("log undoes exp to the last digits for angles down to nothing", "[pose
     const Vector6d back = log(exp(xi));
     INFO("angle " << angle);
     REQUIRE((back.head<3>() - xi.head<3>()).norm() <= 1e-15 * xi.head<3>().norm() * 4.0);
-    // Each component keeps its own digits: small angles are not lost beside large translations.
+    // Relative accuracy of each component: small angles are accurate beside large translations.
     const double scale = xi.tail<3>().stableNorm();
     REQUIRE((back.tail<3>() - xi.tail<3>()).stableNorm() <= 1e-15 * scale * 4.0 + 1e-323 * 4.0);
   }
 }
 
-TEST_CASE("a series and a closed form meet without a step where one takes over from the other", "[pose]") {
+TEST_CASE("the series and the closed form agree where they switch", "[pose]") {
   RandomValues random(4);
   for (int i = 0; i < 2'000; ++i) {
     const Vector6d xi = turning(random.vector<3>(), random.uniform(0.99e-4, 1.01e-4) * random.unit<3>());
@@ -129,7 +124,7 @@ TEST_CASE("at exactly half a turn log gives one of the two axes", "[pose]") {
   }
 }
 
-TEST_CASE("log never turns by more than half a turn, whichever sign the quaternion has", "[pose]") {
+TEST_CASE("log never rotates by more than half a turn, for both signs of the quaternion", "[pose]") {
   RandomValues random(7);
   for (int i = 0; i < 10'000; ++i) {
     const Pose X = random.pose();
@@ -141,7 +136,7 @@ TEST_CASE("log never turns by more than half a turn, whichever sign the quaterni
   }
 }
 
-TEST_CASE("of a small turn no trigonometry is needed", "[pose]") {
+TEST_CASE("the approximate rotation vector is accurate for small angles", "[pose]") {
   RandomValues random(12);
   for (int n = 0; n < 1000; ++n) {
     const double angle = random.log_uniform(1e-9, 0.5);
@@ -162,7 +157,8 @@ TEST_CASE("exp is the matrix exponential", "[pose]") {
   }
 }
 
-TEST_CASE("more than half a turn is the same pose as the rest of the turn the other way", "[pose]") {
+TEST_CASE("a rotation by more than half a turn equals the complementary rotation in the other direction",
+          "[pose]") {
   RandomValues random(9);
   for (int i = 0; i < 2'000; ++i) {
     const Vector6d xi = random.twist(1.0, 20.0);
@@ -171,7 +167,7 @@ TEST_CASE("more than half a turn is the same pose as the rest of the turn the ot
   }
 }
 
-TEST_CASE("motions about one screw add up", "[pose]") {
+TEST_CASE("motions about one screw axis add", "[pose]") {
   RandomValues random(10);
   for (int i = 0; i < 5'000; ++i) {
     const Vector6d xi = random.twist(1.0, 1.0);
@@ -181,7 +177,7 @@ TEST_CASE("motions about one screw add up", "[pose]") {
   }
 }
 
-TEST_CASE("the log of an inverse is the log turned round", "[pose]") {
+TEST_CASE("the log of an inverse is minus the log", "[pose]") {
   RandomValues random(11);
   for (int i = 0; i < 5'000; ++i) {
     const Pose X = random.pose();
@@ -216,7 +212,7 @@ TEST_CASE("the inverse undoes a pose from either side", "[pose]") {
   }
 }
 
-TEST_CASE("composition is matrix multiplication, and a point goes through both", "[pose]") {
+TEST_CASE("composition is matrix multiplication, for poses and points", "[pose]") {
   RandomValues random(14);
   for (int i = 0; i < 5'000; ++i) {
     const Pose X_AB = random.pose();
@@ -240,7 +236,7 @@ TEST_CASE("a chain of any length stays in SE(3)", "[pose]") {
   CHECK(R.determinant() == Approx(1.0).epsilon(1e-15));
 }
 
-TEST_CASE("a turn in many small steps arrives where one turn does", "[pose]") {
+TEST_CASE("a rotation in many small steps equals one rotation", "[pose]") {
   RandomValues random(16);
   constexpr int kSteps = 10'000;
   for (int i = 0; i < 10; ++i) {

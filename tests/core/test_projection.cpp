@@ -13,8 +13,7 @@ using namespace wrenchd::test;
 
 namespace {
 
-/// T for the rotation R_p' R_q = E and the least translation out of one half-space: what is left to minimise
-/// over E.
+/// T for the rotation R_p' R_q = E and the least translation out of one half-space, as a function of E.
 double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaterniond& E) {
   const Pose X_WQ{X_WP.rotation * E, X_WP.translation_m};
   const double lift_m = std::max(0.0, -least_gap_m(scene, X_WQ));
@@ -27,16 +26,16 @@ double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaternion
 double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
   double best = std::numeric_limits<double>::infinity();
   Quaterniond best_E = Quaterniond::Identity();
-  const auto look = [&](const Quaterniond& E) {
+  const auto try_rotation = [&](const Quaterniond& E) {
     const double T = energy_of_rotation(scene, X_WP, E);
     if (T >= best) return false;
     best = T;
     best_E = E;
     return true;
   };
-  for (int i = 0; i < 3000; ++i) look(random.rotation(random.uniform(0.0, 2.0)));
+  for (int i = 0; i < 3000; ++i) try_rotation(random.rotation(random.uniform(0.0, 2.0)));
   double step_rad = 0.2;
-  for (int i = 0; i < 6000; ++i) step_rad *= look(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
+  for (int i = 0; i < 6000; ++i) step_rad *= try_rotation(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
   return best;
 }
 
@@ -75,7 +74,7 @@ TEST_CASE("the exact projection reproduces example 4.1 of the paper", "[projecti
   }
 }
 
-TEST_CASE("against a half-space nothing found by brute force is closer", "[projection]") {
+TEST_CASE("against a half-space brute force finds no closer pose", "[projection]") {
   RandomValues random(1);
   for (int i = 0; i < 60; ++i) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
@@ -88,7 +87,7 @@ TEST_CASE("against a half-space nothing found by brute force is closer", "[proje
   }
 }
 
-TEST_CASE("optimality is proven in nearly every case, and a proof is never wrong", "[projection]") {
+TEST_CASE("optimality is proven in nearly every case, and no proof is wrong", "[projection]") {
   RandomValues random(2);
   int proven = 0;
   constexpr int kCases = 300;
@@ -120,7 +119,7 @@ TEST_CASE("an admissible pose is its own projection, touching or not", "[project
   }
 }
 
-TEST_CASE("a face pressed flat comes straight out, however many vertices it has", "[projection]") {
+TEST_CASE("a face pressed flat moves out along the normal, for any number of vertices", "[projection]") {
   for (const int corners : {4, 12, 40}) {
     std::vector<Vector3d> prism;
     for (int i = 0; i < corners; ++i) {
@@ -140,7 +139,7 @@ TEST_CASE("a face pressed flat comes straight out, however many vertices it has"
   }
 }
 
-TEST_CASE("several half-spaces are met together: a box pressed into a corner of the room", "[projection]") {
+TEST_CASE("several half-spaces together: a box pressed into a corner", "[projection]") {
   RandomValues random(3);
   for (int i = 0; i < 50; ++i) {
     const std::vector<HalfSpaceSettings> room = {half_space(Vector3d::UnitX(), 0.0),
@@ -157,8 +156,8 @@ TEST_CASE("several half-spaces are met together: a box pressed into a corner of 
   }
 }
 
-TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[projection]") {
-  // A 1 x 1 x 0.2 plate stands across a slot 0.5 wide: no translation helps, a turn about x does.
+TEST_CASE("the projection rotates a body to fit it into a narrow slot", "[projection]") {
+  // A plate of 1 x 1 x 0.2 lies across a slot of width 0.5: only a rotation about x makes it admissible.
   const Scene scene(box({1.0, 1.0, 0.2}),
                     {half_space(Vector3d::UnitY(), -0.25), half_space(-Vector3d::UnitY(), -0.25)});
   ExactProjection exact(scene.tool().solid.inertia);
@@ -169,7 +168,7 @@ TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[pro
   check_consistent(scene, X_WP, q);
 }
 
-TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection]") {
+TEST_CASE("obstacles that leave no room are reported as infeasible", "[projection]") {
   const Scene scene(box({1.0, 1.0, 1.0}),
                     {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
   ExactProjection exact(scene.tool().solid.inertia);
@@ -198,8 +197,7 @@ TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]"
   }
 }
 
-TEST_CASE("the projection moves with the world, and does not care where the mesh's frame is",
-          "[projection]") {
+TEST_CASE("the projection is invariant under motions of the world and of the mesh frame", "[projection]") {
   RandomValues random(5);
   for (int i = 0; i < 40; ++i) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
@@ -215,7 +213,7 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
   }
 }
 
-TEST_CASE("mass scales the energy and moves nothing", "[projection]") {
+TEST_CASE("the mass scales the energy and keeps the projection", "[projection]") {
   RandomValues random(6);
   const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
   const Inertia& M = c.scene.tool().solid.inertia;
@@ -240,12 +238,12 @@ TEST_CASE("needles with an inertia of 1 to 1e6 converge like other bodies", "[pr
     const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
     INFO("case " << i);
     REQUIRE(q.status == ProjectionStatus::converged);
-    check_consistent(scene, X_WP, q, 1e-7);  // a roll weighs 1e-6 here, and so do its digits
+    check_consistent(scene, X_WP, q, 1e-7);  // a roll has the weight 1e-6 here, which limits its accuracy
     CHECK(q.energy <= brute_force(scene, X_WP, random) * (1.0 + 1e-9));
   }
 }
 
-TEST_CASE("a followed proxy is admissible at every step, and settles where the optimum is", "[projection]") {
+TEST_CASE("a proxy is admissible at every step and converges to the optimum", "[projection]") {
   RandomValues random(8);
   for (int body = 0; body < 10; ++body) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
@@ -269,8 +267,8 @@ TEST_CASE("a followed proxy is admissible at every step, and settles where the o
   }
 }
 
-// What the proxy among meshes goes by: short steps, each lower, up to where project() goes in one.
-TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", "[projection]") {
+// The proxy among meshes uses short steps, each with less energy, to the result of project().
+TEST_CASE("with a step limit the energy decreases in every step to the optimum", "[projection]") {
   RandomValues random(10);
   for (int body = 0; body < 20; ++body) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
@@ -308,9 +306,9 @@ TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", 
   }
 }
 
-// A peg of 0.1 kg wedged in its hole, a few micrometres from its own optimum: short steps that change nothing
-// but the last digits once took all iterations of every look of a tick.
-TEST_CASE("where only rounding is left between a step and the next, it has converged", "[projection]") {
+// A peg of 0.1 kg jammed in its hole, a few micrometres from the optimum. Steps below rounding once used all
+// iterations of every sweep of a tick.
+TEST_CASE("steps within rounding count as converged", "[projection]") {
   Inertia M;
   M.mass_kg = 0.1;
   M.H_kg_m2 = Vector3d(3.2385630792490916e-05, 3.2385630792490916e-05, 4.7712615571153614e-06).asDiagonal();
@@ -350,7 +348,7 @@ TEST_CASE("where only rounding is left between a step and the next, it has conve
   for (const ActiveContact& active : known) CHECK(gap_m(active.contact, q.X_WQ) > 0.99 * kClearance_m);
 }
 
-TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
+TEST_CASE("at the iteration limit the result is admissible and no worse than translation", "[projection]") {
   RandomValues random(9);
   for (int i = 0; i < 50; ++i) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);

@@ -54,7 +54,7 @@ RealRoots solve(const std::array<double, 5>& c) {
   return real_roots(c[0], c[1], c[2], c[3], c[4]);
 }
 
-/// What rounding of the coefficients makes uncertain in the value at x.
+/// Returns the uncertainty of the value at x from the rounding of the coefficients.
 double noise_at(const std::array<double, 5>& c, long double x) {
   long double terms = 0.0L;
   for (const double coefficient : c) terms = terms * std::abs(x) + std::abs(coefficient);
@@ -77,7 +77,8 @@ double nearest(const RealRoots& found, long double root) {
   return least;
 }
 
-/// Every root returned satisfies the equation to rounding, they rise, and there are no more than the degree.
+/// Checks that every returned root satisfies the equation up to rounding, in ascending order, at most as many
+/// as the degree.
 void require_no_spurious(const std::array<double, 5>& c, const RealRoots& found) {
   const auto degree = c.end() - std::find_if(c.begin(), c.end(), [](double x) { return x != 0.0; }) - 1;
   REQUIRE(found.end() - found.begin() <= std::max<std::ptrdiff_t>(degree, 0));
@@ -89,8 +90,8 @@ void require_no_spurious(const std::array<double, 5>& c, const RealRoots& found)
   }
 }
 
-/// Every real root that stands apart from the others, by what the coefficients' own rounding can move it, is
-/// there.
+/// Checks that every real root that is separated from the others by more than the rounding of the
+/// coefficients is found.
 void require_separated_found(const Made& made, const std::array<double, 5>& c, const RealRoots& found) {
   for (std::size_t i = 0; i < made.roots.size(); ++i) {
     const long double r = made.roots[i];
@@ -112,7 +113,7 @@ void require_solved(const Made& made) {
   require_separated_found(made, c, found);
 }
 
-/// The closed form and the search have the same roots, but for what the coefficients' rounding leaves open.
+/// Checks that closed form and search have the same roots, up to the rounding of the coefficients.
 void require_same_as_bracketing(const std::array<double, 5>& c) {
   const RealRoots found = solve(c);
   const RealRoots searched = real_roots_by_bracketing(c[0], c[1], c[2], c[3], c[4]);
@@ -121,7 +122,7 @@ void require_same_as_bracketing(const std::array<double, 5>& c) {
   REQUIRE(found.count == searched.count);
   for (std::size_t i = 0; i < found.count; ++i) {
     const double x = searched.x[i];
-    const double least = std::numeric_limits<double>::min();  // what is left of a zero that was searched for
+    const double least = std::numeric_limits<double>::min();  // a zero by bisection
     const double uncertain = noise_at(c, x) / std::abs(slope_at(c, x));
     if (found.x[i] != x) REQUIRE(std::abs(found.x[i] - x) <= 4.0 * uncertain + least);
   }
@@ -133,7 +134,7 @@ double leading(RandomValues& random) {
 
 }  // namespace
 
-TEST_CASE("the quartic of example 4.1 has the roots that are known of it", "[quartic]") {
+TEST_CASE("the quartic of example 4.1 has its known roots", "[quartic]") {
   // Eqs. (26)-(30) for the cube of side 50, m = 1, H = 2500/6, vertex (25, -25), h = 25, phi = -0.2. The
   // paper's theta is absolute.
   const double m = 1.0, H = 2500.0 / 6.0, vx = 25.0, vy = -25.0, h = 25.0, phi = -0.2;
@@ -179,7 +180,7 @@ TEST_CASE("two complex pairs: no real root", "[quartic]") {
   }
 }
 
-TEST_CASE("a double root is found, beside what else there is", "[quartic]") {
+TEST_CASE("a double root is found beside other roots", "[quartic]") {
   RandomValues random(4);
   for (int i = 0; i < 5'000; ++i) {
     const double r = random.normal();
@@ -218,14 +219,14 @@ TEST_CASE("triple and quadruple roots are found", "[quartic]") {
     require_no_spurious(c, found);
     REQUIRE(nearest(found, r) <= 1e-3 * (1.0 + std::abs(r)));
   }
-  // With coefficients that are exact the roots are too.
+  // With exact coefficients the roots are exact.
   CHECK(real_roots(1.0, -4.0, 6.0, -4.0, 1.0).count == 1);
   CHECK(real_roots(1.0, -4.0, 6.0, -4.0, 1.0).x[0] == 1.0);
   CHECK(real_roots(3.0, 0.0, 0.0, 0.0, 0.0).count == 1);
   CHECK(real_roots(3.0, 0.0, 0.0, 0.0, 0.0).x[0] == 0.0);
 }
 
-TEST_CASE("roots nearly double", "[quartic]") {
+TEST_CASE("nearly double roots", "[quartic]") {
   RandomValues random(7);
   for (int i = 0; i < 5'000; ++i) {
     const double r = random.normal();
@@ -239,7 +240,7 @@ TEST_CASE("roots nearly double", "[quartic]") {
   }
 }
 
-TEST_CASE("roots of very different size", "[quartic]") {
+TEST_CASE("roots of very different magnitude", "[quartic]") {
   RandomValues random(8);
   for (int i = 0; i < 5'000; ++i) {
     const auto any = [&random] { return random.normal() * random.log_uniform(1e-10, 1e10); };
@@ -247,7 +248,7 @@ TEST_CASE("roots of very different size", "[quartic]") {
   }
 }
 
-TEST_CASE("coefficients of very different size: no spurious root, and one between any change of sign",
+TEST_CASE("coefficients of very different magnitude: one root at each change of sign, no others",
           "[quartic]") {
   RandomValues random(9);
   for (int i = 0; i < 5'000; ++i) {
@@ -272,7 +273,7 @@ TEST_CASE("coefficients of very different size: no spurious root, and one betwee
   }
 }
 
-TEST_CASE("a leading coefficient that vanishes leaves the roots of the rest", "[quartic]") {
+TEST_CASE("a leading coefficient of zero leaves the roots of lower degree", "[quartic]") {
   RandomValues random(10);
   for (int i = 0; i < 5'000; ++i) {
     Made cubic = Made(leading(random)).root(random.normal()).root(random.normal()).root(random.normal());
@@ -306,7 +307,7 @@ TEST_CASE("a quadratic loses no digits to cancellation", "[quartic]") {
   CHECK(found.x[1] == Approx(1e9).epsilon(1e-15));
 }
 
-TEST_CASE("biquadratic: the roots come in pairs of both signs", "[quartic]") {
+TEST_CASE("biquadratic: the roots are pairs of both signs", "[quartic]") {
   RandomValues random(12);
   for (int i = 0; i < 4'000; ++i) {
     const double r = random.log_uniform(1e-3, 1e3);
@@ -345,14 +346,14 @@ TEST_CASE("all coefficients times c: the same roots", "[quartic]") {
   for (int i = 0; i < 5'000; ++i) {
     auto c = Made(leading(random)).root(random.normal()).root(random.normal()).pair(0.1, 1.0).coefficients();
     const RealRoots before = solve(c);
-    const int power = random.integer(-600, 600);  // a power of two rounds nothing
+    const int power = random.integer(-600, 600);  // a power of two, which is exact
     for (double& coefficient : c) coefficient = std::ldexp(coefficient, power);
     const RealRoots after = solve(c);
     REQUIRE(std::equal(before.begin(), before.end(), after.begin(), after.end()));
   }
 }
 
-TEST_CASE("the largest and the smallest coefficients there are", "[quartic]") {
+TEST_CASE("the largest and the smallest finite coefficients", "[quartic]") {
   constexpr double kMost = std::numeric_limits<double>::max();
   constexpr double kLeast = std::numeric_limits<double>::denorm_min();
   for (const double a : {kMost, -kMost, kLeast, -kLeast, 0.0, 1.0})
@@ -366,7 +367,7 @@ TEST_CASE("the largest and the smallest coefficients there are", "[quartic]") {
           }
 }
 
-TEST_CASE("the closed form has the roots that the search has, from known roots of any scale", "[quartic]") {
+TEST_CASE("the closed form and the bracketing search have the same roots, at any scale", "[quartic]") {
   RandomValues random(15);
   for (const double most : {1.0, 1e2, 1e4, 1e8, 1e15}) {
     const auto any = [&] { return random.normal() * random.log_uniform(1.0 / most, most); };
@@ -385,7 +386,7 @@ TEST_CASE("the closed form has the roots that the search has, from known roots o
   }
 }
 
-TEST_CASE("the same with any of the coefficients zero, tiny or huge", "[quartic]") {
+TEST_CASE("closed form and search agree with any coefficient zero, tiny or huge", "[quartic]") {
   RandomValues random(16);
   for (const double odd : {0.0, 1e-300, 1e-100, 1e-17, 1e-8, 1e-4, 1e4, 1e8, 1e17, 1e60})
     for (int which = 1; which < 32; ++which)
@@ -397,7 +398,7 @@ TEST_CASE("the same with any of the coefficients zero, tiny or huge", "[quartic]
       }
 }
 
-TEST_CASE("the same at multiple roots, nearly so, and where two pairs nearly agree", "[quartic]") {
+TEST_CASE("closed form and search agree at multiple and nearly multiple roots", "[quartic]") {
   RandomValues random(17);
   for (int i = 0; i < 3'000; ++i) {
     const double r = random.normal();
@@ -419,8 +420,8 @@ TEST_CASE("the same at multiple roots, nearly so, and where two pairs nearly agr
   }
 }
 
-TEST_CASE("a vertex nearly below the centre of mass: the least of the roots is not lost", "[quartic]") {
-  // Eqs. (26)-(30) at phi = 0. Two coefficients of 1e-8 among ones once gave a half turn for an answer.
+TEST_CASE("a vertex nearly below the centre of mass: the smallest root is found", "[quartic]") {
+  // Eqs. (26)-(30) at phi = 0. Two coefficients of 1e-8 among ones once gave a wrong result of half a turn.
   RandomValues random(18);
   for (int i = 0; i < 5'000; ++i) {
     const double m = 1.0, H = random.uniform(0.02, 0.5), vy = -random.uniform(0.3, 0.9);
@@ -432,8 +433,9 @@ TEST_CASE("a vertex nearly below the centre of mass: the least of the roots is n
   }
 }
 
-TEST_CASE("roots that agree in eight digits, beside one at 1e13, are not taken for certain", "[quartic]") {
-  // A resultant with too much rounding once did: its terms were larger than the roots ask for.
+TEST_CASE("roots that agree in eight digits, beside a root at 1e13, are not accepted unchecked",
+          "[quartic]") {
+  // A resultant with too much rounding once accepted them: its terms were much larger than the roots.
   require_same_as_bracketing(
       {1.0, 17386765417461.773, -3575334326662.4648, 161440795724.83173, -2099485800.5785661});
   require_same_as_bracketing(

@@ -10,7 +10,7 @@ using test::RandomValues;
 
 namespace {
 
-/// F . V: what the wrench does to the body that moves so [W].
+/// F . V: power of the wrench on a body with this twist [W].
 double power_W(const Wrench& F, const Twist& V) {
   return F.force_N.dot(V.linear_m_per_s) + F.torque_Nm.dot(V.angular_rad_per_s);
 }
@@ -25,9 +25,9 @@ double distance(const Twist& a, const Twist& b) {
 
 }  // namespace
 
-TEST_CASE("a force keeps its force and gains its lever about another point", "[spatial]") {
+TEST_CASE("a force about another point has the additional torque of its lever", "[spatial]") {
   const Wrench up{{0.0, 0.0, 10.0}, {0.0, 0.0, 0.0}};
-  const Wrench about_left = shifted(up, {-2.0, 0.0, 0.0});  // seen from two metres to the left
+  const Wrench about_left = shifted(up, {-2.0, 0.0, 0.0});  // about a point 2 m to the left
   CHECK(about_left.force_N == up.force_N);
   CHECK(about_left.torque_Nm == Vector3d(0.0, -20.0, 0.0));  // r x f = (2, 0, 0) x (0, 0, 10)
 }
@@ -40,14 +40,14 @@ TEST_CASE("a pure torque is the same about every point", "[spatial]") {
   }
 }
 
-TEST_CASE("a point off the axis of a turning body moves across", "[spatial]") {
+TEST_CASE("a point off the axis of a rotating body moves perpendicular to its lever", "[spatial]") {
   const Twist turning{{0.0, 0.0, 0.0}, {0.0, 0.0, 3.0}};
   const Twist outside = shifted(turning, {2.0, 0.0, 0.0});
   CHECK(outside.linear_m_per_s == Vector3d(0.0, 6.0, 0.0));
   CHECK(outside.angular_rad_per_s == turning.angular_rad_per_s);
 }
 
-TEST_CASE("a body that does not turn moves alike everywhere", "[spatial]") {
+TEST_CASE("a body without rotation has the same velocity at every point", "[spatial]") {
   RandomValues random(2);
   for (int i = 0; i < 100; ++i) {
     const Twist V{random.vector<3>(), Vector3d::Zero()};
@@ -55,7 +55,7 @@ TEST_CASE("a body that does not turn moves alike everywhere", "[spatial]") {
   }
 }
 
-TEST_CASE("shifts add up, and shifting back undoes", "[spatial]") {
+TEST_CASE("changes of the point compose and can be inverted", "[spatial]") {
   RandomValues random(3);
   for (int i = 0; i < 2'000; ++i) {
     const Wrench F = random.wrench();
@@ -71,7 +71,7 @@ TEST_CASE("shifts add up, and shifting back undoes", "[spatial]") {
   }
 }
 
-TEST_CASE("axes chain, and turning them back undoes", "[spatial]") {
+TEST_CASE("changes of axes compose and can be inverted", "[spatial]") {
   RandomValues random(4);
   for (int i = 0; i < 2'000; ++i) {
     const Wrench F_C = random.wrench();
@@ -85,7 +85,7 @@ TEST_CASE("axes chain, and turning them back undoes", "[spatial]") {
   }
 }
 
-TEST_CASE("it does not matter whether the axes or the point are changed first", "[spatial]") {
+TEST_CASE("changes of axes and of the point commute", "[spatial]") {
   RandomValues random(5);
   for (int i = 0; i < 2'000; ++i) {
     const Quaterniond R_AB = random.rotation();
@@ -110,7 +110,7 @@ TEST_CASE("power is the same about every point and in all axes", "[spatial]") {
   }
 }
 
-TEST_CASE("wrenches add up about any point", "[spatial]") {
+TEST_CASE("wrenches add about any point", "[spatial]") {
   RandomValues random(7);
   for (int i = 0; i < 2'000; ++i) {
     const Wrench F = random.wrench();
@@ -120,7 +120,7 @@ TEST_CASE("wrenches add up about any point", "[spatial]") {
   }
 }
 
-TEST_CASE("shifting and turning are the adjoint transformation, METHOD (4)", "[spatial]") {
+TEST_CASE("changes of point and axes together are the adjoint transformation, METHOD (4)", "[spatial]") {
   RandomValues random(8);
   for (int i = 0; i < 2'000; ++i) {
     const Pose X_AB = random.pose();

@@ -25,8 +25,8 @@ Coupling spring(double linear, double angular) {
   return {WrenchGains::blockwise(linear, angular), Matrix6d::Zero()};
 }
 
-/// A handle of 0.15 kg with 0.5 N.s/m of friction on a sampled, delayed spring along x, in nobody's hand:
-/// what is left of its energy after 4 s, in that of the start.
+/// A free handle of 0.15 kg with friction of 0.5 N.s/m on a sampled, delayed spring along x. Returns its
+/// energy after 4 s divided by its initial energy.
 double swing_left(double K_N_per_m, const LoopDelay& loop) {
   constexpr int kSubsteps = 100;
   SimulationSettings s;
@@ -56,8 +56,7 @@ double swing_left(double K_N_per_m, const LoopDelay& loop) {
 
 }  // namespace
 
-TEST_CASE("the bound on stiffness is that of a swinging handle, for any rate and delay",
-          "[stability_bound]") {
+TEST_CASE("the stiffness bound agrees with a simulated handle, for any rate and delay", "[stability_bound]") {
   struct Case {
     LoopDelay loop;
     double most_N_per_m;
@@ -69,14 +68,13 @@ TEST_CASE("the bound on stiffness is that of a swinging handle, for any rate and
     const StabilityBound bound = stability_bound(kDevice, loop, spring(0.0, 0.0), {});
     CHECK(bound.max_stiffness_N_per_m == Approx(most).epsilon(1e-12));
     CHECK(bound.max_stiffness_Nm_per_rad == Approx(most * 0.002 / 0.5).epsilon(1e-12));
-    // What is stable and what is not lies 3 % to either side of it; the plant's own substeps make 1 % of
-    // that.
+    // 3 % below the bound is stable, 3 % above it unstable; substeps of the plant contribute 1 %.
     CHECK(swing_left(0.97 * most, loop) < 1.0);
     CHECK(swing_left(1.03 * most, loop) > 1.0);
   }
 }
 
-TEST_CASE("a spring and damper are scaled until they just fit", "[stability_bound]") {
+TEST_CASE("a spring and damper are scaled to the bound", "[stability_bound]") {
   const LoopDelay loop{1e-3, 1e-3};  // T/2 + tau = 1.5 ms
   SECTION("within the bound nothing is scaled") {
     CHECK(stability_bound(kDevice, loop, spring(300.0, 1.0), {}).scale == 1.0);
@@ -93,7 +91,7 @@ TEST_CASE("a spring and damper are scaled until they just fit", "[stability_boun
     const StabilityBound bound = stability_bound(kDevice, loop, coupling, {});
     CHECK(bound.scale == Approx(0.5 / (0.3 + 0.7)));
     CHECK(bound.scale_undamped == 1.0);
-    CHECK(bound.max_stiffness_N_per_m == 0.0);  // the damper alone is too much
+    CHECK(bound.max_stiffness_N_per_m == 0.0);  // the damper alone exceeds the bound
     coupling.damping = WrenchGains::blockwise(0.2, 0.0);
     CHECK(stability_bound(kDevice, loop, coupling, {}).max_stiffness_N_per_m == Approx(0.3 / 1.5e-3));
   }
@@ -103,9 +101,9 @@ TEST_CASE("a spring and damper are scaled until they just fit", "[stability_boun
   }
 }
 
-TEST_CASE("a tool held by a lever is stiffer to turn", "[stability_bound]") {
-  // A linear spring at the end of a lever l: K l^2 against turning. b_rot / (K l^2) decides here, and the
-  // coupling of both halves makes it a little less.
+TEST_CASE("a lever to the tool increases the rotational stiffness", "[stability_bound]") {
+  // A linear spring at the end of a lever l has the rotational stiffness K l^2. b_rot / (K l^2) is the
+  // tightest bound; the coupling of translation and rotation reduces it slightly.
   const LoopDelay loop{1e-3, 0.5e-3};  // T/2 + tau = 1 ms
   const double l = 0.1, K = 300.0;
   const Pose X_HT{Quaterniond::Identity(), {l, 0.0, 0.0}};
@@ -114,7 +112,7 @@ TEST_CASE("a tool held by a lever is stiffer to turn", "[stability_bound]") {
         Approx(1.0 / (1e-3 * K * (1.0 / 0.5 + l * l / 0.002))));
 }
 
-TEST_CASE("the scaled coupling just passes the inequality, wherever the tool is held", "[stability_bound]") {
+TEST_CASE("the scaled coupling just satisfies the inequality, for any lever", "[stability_bound]") {
   RandomValues random(11);
   for (int n = 0; n < 50; ++n) {
     const Pose X_HT = random.pose(0.05);
@@ -125,7 +123,7 @@ TEST_CASE("the scaled coupling just passes the inequality, wherever the tool is 
     const double s = stability_bound(kDevice, loop, coupling, X_HT).scale;
     REQUIRE(s > 0.0);
     REQUIRE(s < 1.0);
-    // Held against powers of random twists of the handle, with the tool's twist worked out on its own.
+    // Compared with powers of random twists of the handle; the twist of the tool is computed independently.
     const double lag_s = 0.5 * loop.period_s + loop.delay_s;
     const auto taken = [&](const Twist& V_H) {
       return 0.5 * V_H.linear_m_per_s.squaredNorm() + 0.002 * V_H.angular_rad_per_s.squaredNorm();
@@ -146,7 +144,7 @@ TEST_CASE("the scaled coupling just passes the inequality, wherever the tool is 
   }
 }
 
-TEST_CASE("what has no motors is not asked about", "[stability_bound]") {
+TEST_CASE("a device without motors needs no bound", "[stability_bound]") {
   const LoopDelay loop{1e-3, 1e-3};
   const DeviceDamping force_only{0.5, DeviceProfile::kNotStated};
   const StabilityBound bound = stability_bound(force_only, loop, spring(200.0, 1e6), {}, kLinearDofs);
@@ -156,19 +154,19 @@ TEST_CASE("what has no motors is not asked about", "[stability_bound]") {
                     Catch::Contains("damping_Nm_s_per_rad"));
 }
 
-TEST_CASE("a coarse encoder bounds a wall that rate and delay would bear", "[stability_bound]") {
+TEST_CASE("the encoder step can be the tightest bound", "[stability_bound]") {
   const LoopDelay loop{0.5e-3, 0.0};
   const DeviceDamping much{50.0, 0.5};
   const StabilityBound fine = stability_bound(much, loop, spring(5000.0, 5.0), {});
   CHECK(fine.scale == 1.0);
-  // K step^2 / 4 is what an edge may give: 200 N/m at 100 um.
+  // K step^2 / 4 limits the energy of an encoder step: 200 N/m at 100 um.
   const StabilityBound coarse =
       stability_bound(much, loop, spring(5000.0, 5.0), {}, kAllDofs, {100e-6, 1e-3});
   CHECK(coarse.max_stiffness_N_per_m == Approx(200.0));
   CHECK(coarse.max_stiffness_Nm_per_rad == Approx(2.0));
   CHECK(coarse.scale == Approx(0.04));
   CHECK(coarse.scale_undamped == Approx(0.04));
-  // Of what is not driven no step counts.
+  // Encoder steps of undriven axes have no effect.
   const StabilityBound turned =
       stability_bound(much, loop, spring(5000.0, 5.0), {}, kAngularDofs, {100e-6, 1e-3});
   CHECK(turned.scale == Approx(0.4));
@@ -176,7 +174,7 @@ TEST_CASE("a coarse encoder bounds a wall that rate and delay would bear", "[sta
                     Catch::Contains("encoder's step"));
 }
 
-TEST_CASE("the bound refuses what cannot be, and names it", "[stability_bound]") {
+TEST_CASE("the bound rejects invalid inputs by name", "[stability_bound]") {
   const LoopDelay loop{1e-3, 1e-3};
   CHECK_THROWS_WITH(stability_bound({}, loop, spring(1.0, 1.0), {}), Catch::Contains("damping_N_s_per_m"));
   CHECK_THROWS_WITH(stability_bound({-0.1, 0.1}, loop, spring(1.0, 1.0), {}), Catch::Contains("0 or more"));
@@ -190,7 +188,7 @@ TEST_CASE("the bound refuses what cannot be, and names it", "[stability_bound]")
   CHECK_THROWS_WITH(stability_bound(kDevice, loop, coupling, {}), Catch::Contains("damping"));
 }
 
-TEST_CASE("the energy law's stiffness is its derivative where it rests", "[stability_bound]") {
+TEST_CASE("the stiffness of the energy law is its derivative at the equilibrium", "[stability_bound]") {
   RandomValues random(12);
   for (int n = 0; n < 20; ++n) {
     const Inertia M = random.inertia(0.1);
@@ -228,7 +226,7 @@ TEST_CASE("stiffness and damping along axes without motors do not change the bou
     }
 }
 
-TEST_CASE("the stiffest spring beside a damper just passes the inequality", "[stability_bound]") {
+TEST_CASE("the stiffest spring beside a damper just satisfies the inequality", "[stability_bound]") {
   RandomValues random(14);
   const LoopDelay loop{1e-3, 1.5e-3};  // T/2 + tau = 2 ms
   for (int n = 0; n < 20; ++n) {

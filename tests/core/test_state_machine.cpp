@@ -25,7 +25,7 @@ StateMachine waiting(double ramp_s) {
   return machine;
 }
 
-/// Armed, calm for long enough, in the first tick of the ramp.
+/// Returns a machine that is armed and calm, in the first tick of the ramp.
 StateMachine ramping(double ramp_s) {
   StateMachine machine = waiting(ramp_s);
   while (machine.state() == State::waiting) machine.advance(true, kTick_s);
@@ -40,8 +40,7 @@ StateMachine active(double ramp_s) {
 
 }  // namespace
 
-TEST_CASE("every start is without a device, then disarmed, and stays so however calm the hand",
-          "[state_machine]") {
+TEST_CASE("the machine starts disconnected, then disarmed, and stays so for any hand", "[state_machine]") {
   CHECK(StateMachine(1.0).state() == State::disconnected);
   StateMachine machine = disarmed(1.0);
   for (int i = 0; i < 10'000; ++i) {
@@ -50,9 +49,9 @@ TEST_CASE("every start is without a device, then disarmed, and stays so however 
   }
 }
 
-TEST_CASE("armed, it waits until the hand has been calm for a moment", "[state_machine]") {
+TEST_CASE("after arming it waits until the hand has been calm for 100 ms", "[state_machine]") {
   StateMachine machine = disarmed(1.0);
-  for (int i = 0; i < 1'000; ++i) machine.advance(true, kTick_s);  // time before arming is not time of calm
+  for (int i = 0; i < 1'000; ++i) machine.advance(true, kTick_s);  // calm time before arming does not count
   machine.on(Trigger::arm);
   CHECK(machine.state() == State::waiting);
   for (int i = 1; i < kCalmTicks; ++i) {
@@ -63,7 +62,7 @@ TEST_CASE("armed, it waits until the hand has been calm for a moment", "[state_m
   CHECK(machine.state() == State::ramping);
 }
 
-TEST_CASE("one moment without calm and the wait starts again", "[state_machine]") {
+TEST_CASE("the wait starts again when the hand is not calm", "[state_machine]") {
   StateMachine machine = waiting(1.0);
   for (int round = 0; round < 10; ++round) {
     for (int i = 1; i < kCalmTicks; ++i) machine.advance(true, kTick_s);
@@ -78,7 +77,7 @@ TEST_CASE("one moment without calm and the wait starts again", "[state_machine]"
   CHECK(machine.state() == State::ramping);
 }
 
-TEST_CASE("the ramp rises evenly from nothing to full authority in its time", "[state_machine]") {
+TEST_CASE("the ramp rises linearly from 0 to full authority in its duration", "[state_machine]") {
   for (const double ramp_s : {0.125, 1.0, 4.0}) {
     StateMachine machine = ramping(ramp_s);
     const int ticks = static_cast<int>(ramp_s / kTick_s);
@@ -92,14 +91,14 @@ TEST_CASE("the ramp rises evenly from nothing to full authority in its time", "[
   }
 }
 
-TEST_CASE("no ramp at all is a step", "[state_machine]") {
+TEST_CASE("a ramp of zero duration is a step", "[state_machine]") {
   StateMachine machine = waiting(0.0);
   while (machine.state() == State::waiting) REQUIRE(machine.advance(true, kTick_s) == 0.0);
   CHECK(machine.advance(true, kTick_s) == 1.0);
   CHECK(machine.state() == State::active);
 }
 
-TEST_CASE("to be disarmed takes the force within 100 ms, and never at once", "[state_machine]") {
+TEST_CASE("disarming removes the force within 100 ms, without a step", "[state_machine]") {
   StateMachine machine = active(1.0);
   machine.on(Trigger::disarm);
   CHECK(machine.state() == State::releasing);
@@ -116,7 +115,7 @@ TEST_CASE("to be disarmed takes the force within 100 ms, and never at once", "[s
   CHECK(machine.authority() == 0.0);
 }
 
-TEST_CASE("an interruption takes all authority at once and starts again from waiting", "[state_machine]") {
+TEST_CASE("an interruption removes all authority immediately and returns to waiting", "[state_machine]") {
   for (StateMachine machine : {ramping(1.0), active(1.0)}) {
     machine.on(Trigger::interrupted);
     CHECK(machine.state() == State::waiting);
@@ -128,8 +127,7 @@ TEST_CASE("an interruption takes all authority at once and starts again from wai
   }
 }
 
-TEST_CASE("a fault that passes fades the force in 10 ms, and it comes back by a ramp of its own",
-          "[state_machine]") {
+TEST_CASE("a temporary fault fades the force in 10 ms; recovery has a ramp of its own", "[state_machine]") {
   StateMachine machine = active(1.0);
   CHECK(machine.on(Fault::sample_late));
   CHECK(machine.state() == State::degraded);
@@ -155,8 +153,7 @@ TEST_CASE("a fault that passes fades the force in 10 ms, and it comes back by a 
   CHECK(machine.state() == State::active);
 }
 
-TEST_CASE("a fault that keeps coming never lets the force back, and is one to look at after half a second",
-          "[state_machine]") {
+TEST_CASE("a recurring fault keeps the force at zero and latches after half a second", "[state_machine]") {
   StateMachine machine = active(1.0);
   for (int i = 0; machine.overdue() == Fault::none; ++i) {
     REQUIRE(i < 600);
@@ -170,7 +167,7 @@ TEST_CASE("a fault that keeps coming never lets the force back, and is one to lo
   CHECK(machine.overdue() == Fault::none);
 }
 
-TEST_CASE("what passes more than five times in ten seconds is one to look at", "[state_machine]") {
+TEST_CASE("more than five temporary faults in ten seconds latch", "[state_machine]") {
   for (const bool fast : {true, false}) {
     StateMachine machine = active(0.1);
     int times = 0;
@@ -186,7 +183,7 @@ TEST_CASE("what passes more than five times in ten seconds is one to look at", "
   }
 }
 
-TEST_CASE("a latched fault keeps its first cause until somebody acknowledges, and is tested anew then",
+TEST_CASE("a latched fault keeps its first cause until an acknowledgement; then the self-test runs",
           "[state_machine]") {
   StateMachine machine = active(1.0);
   CHECK(machine.on(Fault::overspeed));
@@ -208,7 +205,8 @@ TEST_CASE("a latched fault keeps its first cause until somebody acknowledges, an
   CHECK(machine.cause() == Fault::none);
 }
 
-TEST_CASE("whatever happens, force is in four states, rises in one, and a latch holds", "[state_machine]") {
+TEST_CASE("for random triggers: force in four states only, a rise in one only, latches hold",
+          "[state_machine]") {
   RandomValues random(20261122);
   StateMachine machine(0.05);
   double before = 0.0;

@@ -5,7 +5,7 @@
 
 using wrenchd::StaticVector;
 
-TEST_CASE("a fixed list takes what fits, and a copy is its own", "[fixed_list]") {
+TEST_CASE("a static vector stores up to its capacity, and a copy is independent", "[fixed_list]") {
   StaticVector<int, 3> list;
   CHECK(list.empty());
   CHECK(list.add(1));

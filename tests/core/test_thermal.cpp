@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kTick_s = 1e-3;
 
-/// The loopback's motors.
+/// Motors of the loopback device.
 DeviceProfile motors(double continuous_force_N = 4.0, double continuous_torque_Nm = 0.2,
                      double thermal_time_s = 20.0) {
   DeviceProfile profile;
@@ -35,14 +35,14 @@ Wrench push(double force_N, double torque_Nm = 0.0) {
   return {{0.6 * force_N, 0.0, 0.8 * force_N}, {0.0, torque_Nm, 0.0}};
 }
 
-/// As much as the ceiling lets through.
+/// Returns a wrench at the current limit.
 Wrench full(const ThermalModel& model, double share = 1.0) {
   return push(share * model.force_ceiling_N(), share * model.torque_ceiling_Nm());
 }
 
 }  // namespace
 
-TEST_CASE("from cold, full force folds back after -T ln(1 - (continuous / max)^2)", "[thermal]") {
+TEST_CASE("from cold, full force is reduced after -T ln(1 - (continuous / max)^2)", "[thermal]") {
   struct Case {
     double continuous_N, max_N, time_s;
   };
@@ -51,7 +51,7 @@ TEST_CASE("from cold, full force folds back after -T ln(1 - (continuous / max)^2
     ThermalModel model(motors(c.continuous_N, 0.2, c.time_s), c.max_N, 0.5);
     double t = 0.0;
     for (; !model.folded_back() && t < 10.0 * c.time_s; t += kTick_s) {
-      REQUIRE(model.force_ceiling_N() == c.max_N);  // until then all of it
+      REQUIRE(model.force_ceiling_N() == c.max_N);  // the full maximum until then
       model.advance(push(c.max_N), kTick_s);
     }
     const double share = c.continuous_N / c.max_N;
@@ -60,14 +60,14 @@ TEST_CASE("from cold, full force folds back after -T ln(1 - (continuous / max)^2
   }
 }
 
-TEST_CASE("the heat is the first-order answer to any steady push", "[thermal]") {
+TEST_CASE("the heat is the first-order response to a constant force", "[thermal]") {
   for (const double force_N : {0.5, 2.0, 3.9}) {
     ThermalModel model(motors(), 10.0, 0.5);
-    const double settles = force_N * force_N / 16.0;
+    const double final_heat = force_N * force_N / 16.0;
     for (int tick = 1; tick <= 40'000; ++tick) {
       model.advance(push(force_N), kTick_s);
       if (tick % 10'000 == 0)
-        CHECK(model.force_heat() == Approx(settles * -std::expm1(-tick * kTick_s / 20.0)).epsilon(1e-9));
+        CHECK(model.force_heat() == Approx(final_heat * -std::expm1(-tick * kTick_s / 20.0)).epsilon(1e-9));
     }
     CHECK_FALSE(model.folded_back());
     CHECK(model.force_ceiling_N() == 10.0);
@@ -75,7 +75,7 @@ TEST_CASE("the heat is the first-order answer to any steady push", "[thermal]") 
   }
 }
 
-TEST_CASE("the step is any: one of a second warms as a thousand of a millisecond", "[thermal]") {
+TEST_CASE("the heat does not depend on the time step", "[thermal]") {
   ThermalModel fine(motors(), 10.0, 0.5), coarse(motors(), 10.0, 0.5);
   for (int tick = 0; tick < 2'000; ++tick) fine.advance(push(8.0, 0.4), kTick_s);
   for (int step = 0; step < 2; ++step) coarse.advance(push(8.0, 0.4), 1.0);
@@ -83,7 +83,7 @@ TEST_CASE("the step is any: one of a second warms as a thousand of a millisecond
   CHECK(coarse.torque_heat() == Approx(fine.torque_heat()).epsilon(1e-9));
 }
 
-TEST_CASE("force and torque warm each on its own", "[thermal]") {
+TEST_CASE("force and torque heat separate motors", "[thermal]") {
   ThermalModel model(motors(), 10.0, 0.5);
   for (int tick = 0; tick < 10'000; ++tick) model.advance(push(0.0, model.torque_ceiling_Nm()), kTick_s);
   CHECK(model.folded_back());
@@ -92,7 +92,7 @@ TEST_CASE("force and torque warm each on its own", "[thermal]") {
   CHECK(model.force_heat() == 0.0);
 }
 
-TEST_CASE("under full demand the ceiling goes down without a jump and stays at the rating", "[thermal]") {
+TEST_CASE("under full demand the limit decreases continuously to the rating", "[thermal]") {
   ThermalModel model(motors(), 10.0, 0.5);
   const LimitSettings settings;
   double before_N = model.force_ceiling_N(), before_Nm = model.torque_ceiling_Nm();
@@ -107,14 +107,14 @@ TEST_CASE("under full demand the ceiling goes down without a jump and stays at t
     before_N = model.force_ceiling_N();
     before_Nm = model.torque_ceiling_Nm();
   }
-  CHECK(folds == 1);  // it does not chatter
+  CHECK(folds == 1);  // the limit does not chatter
   CHECK(model.folded_back());
   CHECK(model.force_ceiling_N() == 4.0);
   CHECK(model.torque_ceiling_Nm() == 0.2);
   CHECK(model.force_heat() == Approx(1.0).margin(1e-3));
 }
 
-TEST_CASE("released, it cools for T ln(1 / 0.8) and gives the maximum again, without a jump", "[thermal]") {
+TEST_CASE("without force it cools for T ln(1 / 0.8) and returns continuously to the maximum", "[thermal]") {
   ThermalModel model(motors(), 10.0, 0.5);
   for (int tick = 0; tick < 300'000; ++tick) model.advance(full(model), kTick_s);
   const double heat = model.force_heat();
@@ -135,7 +135,7 @@ TEST_CASE("released, it cools for T ln(1 / 0.8) and gives the maximum again, wit
   CHECK(model.force_ceiling_N() == 10.0);
 }
 
-TEST_CASE("no duty cycle takes the heat above 1.05 of the rating, whatever the motors are", "[thermal]") {
+TEST_CASE("no duty cycle heats any motor above 1.05 of its rating", "[thermal]") {
   constexpr std::uint64_t kSeed = 11;
   RandomValues random(kSeed);
   double hottest = 0.0;
@@ -169,8 +169,7 @@ TEST_CASE("no duty cycle takes the heat above 1.05 of the rating, whatever the m
   CHECK(folded > 100);
 }
 
-TEST_CASE("motors whose rating is not stated, or not below the maximum, have the maximum for ever",
-          "[thermal]") {
+TEST_CASE("motors without a rating below their maximum always have the maximum", "[thermal]") {
   const double none = DeviceProfile::kNotStated;
   for (const DeviceProfile& profile :
        {motors(none, none, none), motors(none, 0.2, 20.0), motors(10.0, 0.5, 20.0), motors(4.0, 0.2, none),
@@ -183,27 +182,28 @@ TEST_CASE("motors whose rating is not stated, or not below the maximum, have the
       REQUIRE_FALSE(model.folded_back());
     }
   }
-  ThermalModel tightened(motors(), 3.0, 0.5);  // the configuration allows less than the rating
+  ThermalModel tightened(motors(), 3.0, 0.5);  // the configured maximum is below the rating
   for (int tick = 0; tick < 100; ++tick) tightened.advance(push(3.0), 1.0);
   CHECK(tightened.force_ceiling_N() == 3.0);
   CHECK_FALSE(tightened.folded_back());
 }
 
-TEST_CASE("bad times warm nothing, and a push that is no number counts as the maximum", "[thermal]") {
+TEST_CASE("an invalid time step adds no heat, and a force that is not a number counts as the maximum",
+          "[thermal]") {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   ThermalModel model(motors(), 10.0, 0.5);
   for (const double dt_s : {0.0, -0.0, -1.0, nan, inf, -inf}) model.advance(push(10.0, 0.5), dt_s);
   CHECK(model.force_heat() == 0.0);
   CHECK(model.force_ceiling_N() == 10.0);
   for (const double bad : {nan, inf, 50.0, 1e100, 1e200, 1e308}) {
-    ThermalModel same(motors(), 10.0, 0.5), spoilt(motors(), 10.0, 0.5);
+    ThermalModel same(motors(), 10.0, 0.5), disturbed(motors(), 10.0, 0.5);
     for (int tick = 0; tick < 100; ++tick) {
       same.advance(push(10.0), kTick_s);
-      spoilt.advance({{bad, 0.0, 0.0}, {0.0, 0.0, 0.0}}, kTick_s);
+      disturbed.advance({{bad, 0.0, 0.0}, {0.0, 0.0, 0.0}}, kTick_s);
     }
-    CHECK(spoilt.force_heat() == Approx(same.force_heat()).epsilon(1e-12));
+    CHECK(disturbed.force_heat() == Approx(same.force_heat()).epsilon(1e-12));
   }
-  model.advance(push(10.0), 1e300);  // an age at full force: as hot as it gets, and down to the rating
+  model.advance(push(10.0), 1e300);  // a very long time at full force: maximum heat, limit at the rating
   CHECK(model.force_heat() == Approx(6.25));
   CHECK(model.folded_back());
   CHECK(model.force_ceiling_N() == 4.0);
@@ -211,7 +211,7 @@ TEST_CASE("bad times warm nothing, and a push that is no number counts as the ma
   CHECK(model.force_ceiling_N() == 10.0);
 }
 
-TEST_CASE("heat and limits together: what goes out follows the ceiling, says why, and allocates nothing",
+TEST_CASE("heat and limits together: the wrench follows the limit, with the cause, without allocation",
           "[thermal][limits]") {
   const DeviceProfile profile = motors();
   WrenchLimits limits({}, profile);

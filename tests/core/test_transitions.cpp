@@ -19,8 +19,7 @@ State after(Trigger trigger, State from) {
 
 }  // namespace
 
-TEST_CASE("every trigger in every state leads to the state that the safety requirements name",
-          "[transitions]") {
+TEST_CASE("every trigger in every state leads to the state of the safety requirements", "[transitions]") {
   int pairs = 0;
   for (std::size_t t = 0; t < kTriggerCount; ++t)
     for (std::size_t s = 0; s < kStateCount; ++s, ++pairs) {
@@ -37,7 +36,8 @@ TEST_CASE("every trigger in every state leads to the state that the safety requi
   CHECK(pairs == 18 * 11);
 }
 
-TEST_CASE("no row gives force: all that lead out of it take it, in this tick or by a fade", "[transitions]") {
+TEST_CASE("no transition adds force; those that leave a driving state remove it at once or by a fade",
+          "[transitions]") {
   for (const Transition& row : transitions())
     for (std::size_t s = 0; s < kStateCount; ++s) {
       const auto from = static_cast<State>(s);
@@ -51,7 +51,7 @@ TEST_CASE("no row gives force: all that lead out of it take it, in this tick or 
     }
 }
 
-TEST_CASE("a latch opens by an acknowledgement, and by the end of the process", "[transitions]") {
+TEST_CASE("only an acknowledgement or the end of the process leaves a latched state", "[transitions]") {
   for (std::size_t t = 0; t < kTriggerCount; ++t)
     for (const State from : {State::fault, State::stopped}) {
       const auto trigger = static_cast<Trigger>(t);
@@ -62,7 +62,7 @@ TEST_CASE("a latch opens by an acknowledgement, and by the end of the process", 
     }
 }
 
-TEST_CASE("full force is at the end of one way only: tested, armed, calm, risen", "[transitions]") {
+TEST_CASE("only one path leads to full force: self-test, arm, calm, ramp", "[transitions]") {
   const auto leading_to = [](State to) {
     std::set<std::pair<State, Trigger>> ways;
     for (std::size_t t = 0; t < kTriggerCount; ++t)
@@ -83,7 +83,7 @@ TEST_CASE("full force is at the end of one way only: tested, armed, calm, risen"
                                              {State::stopped, Trigger::acknowledge}});
 }
 
-TEST_CASE("every state can be reached, and left", "[transitions]") {
+TEST_CASE("every state can be entered and left", "[transitions]") {
   std::set<State> reached = {State::disconnected};
   for (std::size_t round = 0; round < kStateCount; ++round)
     for (const State from : std::set<State>(reached))

@@ -25,7 +25,7 @@ Vector6d zero() {
   return Vector6d::Zero();
 }
 
-/// Proportional, integral or derivative gain alone, without limits that matter.
+/// Proportional, integral or derivative gain alone, with wide limits.
 WrenchGains stiff(const Matrix6d& K) {
   WrenchGains gains;
   gains.stiffness = K;
@@ -51,7 +51,7 @@ Matrix6d full(RandomValues& random) {
 
 }  // namespace
 
-TEST_CASE("P alone: the wrench is K_P eps, at once and with all 36 entries", "[wrench_law]") {
+TEST_CASE("P alone: the wrench is K_P eps immediately, with all 36 entries", "[wrench_law]") {
   RandomValues random(1);
   for (int i = 0; i < 1'000; ++i) {
     const Matrix6d K = full(random);  // in general not even symmetric
@@ -85,7 +85,7 @@ TEST_CASE("blockwise: one gain for the force, one for the torque", "[wrench_law]
   CHECK(F.torque_Nm == Vector3d(20.0, 25.0, 30.0));
 }
 
-TEST_CASE("outside contact there is no wrench, whatever eps and the past are", "[wrench_law]") {
+TEST_CASE("outside contact the wrench is zero for any eps and history", "[wrench_law]") {
   RandomValues random(2);
   WrenchGains gains = stiff(full(random));
   gains.integral = full(random);
@@ -112,12 +112,12 @@ TEST_CASE("I: the rectangle rule over real time steps", "[wrench_law]") {
   }
 }
 
-TEST_CASE("anti-windup: the integral's force stops at its limit and leaves it at once when eps turns",
+TEST_CASE("anti-windup: the integral's force stops at its limit and leaves it when eps reverses",
           "[wrench_law]") {
   WrenchLaw law(integral(WrenchGains::scalar(10.0), 2.0, 1e9));
   const Vector6d eps = Vector6d::Unit(0);
   double force_N = 0.0;
-  for (int tick = 0; tick < 10'000; ++tick) {  // 10 s: a hundred newtons, were there no limit
+  for (int tick = 0; tick < 10'000; ++tick) {  // 10 s: 100 N without the limit
     force_N = law.update(eps, true, kTick_s).force_N.x();
     REQUIRE(force_N <= 2.0 * (1.0 + 1e-15));
   }
@@ -178,7 +178,7 @@ TEST_CASE("D: the step response of a first-order low pass by backward Euler", "[
   }
 }
 
-TEST_CASE("D: a step of eps is an impulse that dies away", "[wrench_law]") {
+TEST_CASE("D: a step of eps gives a decaying impulse", "[wrench_law]") {
   const double f = 100.0;
   const double a = kTick_s / (kTick_s + 1.0 / (2.0 * pi * f));
   WrenchLaw law(damped(WrenchGains::scalar(1.0), f));
@@ -200,7 +200,7 @@ TEST_CASE("D: the filter is stable for any time step", "[wrench_law]") {
   CHECK(stacked(law.update(Vector6d::Unit(0), true, 1.0)).norm() < 1e-12);
 }
 
-TEST_CASE("a time step that is not positive: no time has passed", "[wrench_law]") {
+TEST_CASE("a time step that is not positive counts as zero", "[wrench_law]") {
   RandomValues random(7);
   for (const double dt_s : {0.0, -0.0, -1e-3, -1e9}) {
     WrenchGains gains = stiff(full(random));
@@ -215,7 +215,7 @@ TEST_CASE("a time step that is not positive: no time has passed", "[wrench_law]"
   }
 }
 
-TEST_CASE("leaving contact forgets integral and derivative: a new contact starts clean", "[wrench_law]") {
+TEST_CASE("leaving contact resets integral and derivative", "[wrench_law]") {
   RandomValues random(8);
   WrenchGains gains = stiff(full(random));
   gains.integral = full(random);
@@ -235,7 +235,7 @@ TEST_CASE("leaving contact forgets integral and derivative: a new contact starts
   }
 }
 
-TEST_CASE("P, I and D add up: Eq. (16)", "[wrench_law]") {
+TEST_CASE("P, I and D add: Eq. (16)", "[wrench_law]") {
   RandomValues random(9);
   const Matrix6d P = full(random), I = full(random), D = full(random);
   WrenchGains gains = integral(I);
@@ -251,7 +251,7 @@ TEST_CASE("P, I and D add up: Eq. (16)", "[wrench_law]") {
   }
 }
 
-TEST_CASE("the translational method's torque takes the gain of its force", "[wrench_law]") {
+TEST_CASE("the torque of the translational method uses the gain of its force", "[wrench_law]") {
   WrenchGains gains;
   gains.stiffness = WrenchGains::blockwise(200.0, 5.0);
   gains.integral = WrenchGains::blockwise(30.0, 0.5);
@@ -266,7 +266,7 @@ TEST_CASE("the translational method's torque takes the gain of its force", "[wre
   CHECK(translational.integral_limit_N == 3.0);
   CHECK(translational.integral_limit_Nm == 0.3);
   CHECK(translational.derivative_cutoff_Hz == 55.0);
-  gains.stiffness.diagonal() << 100.0, 200.0, 300.0, 1.0, 2.0, 3.0;  // of three gains, their mean
+  gains.stiffness.diagonal() << 100.0, 200.0, 300.0, 1.0, 2.0, 3.0;  // the mean of three gains
   CHECK(gains_for(Method::translational, gains).stiffness == WrenchGains::scalar(200.0));
   for (const Method method : {Method::exact, Method::planar}) {
     const WrenchGains same = gains_for(method, gains);
@@ -286,7 +286,7 @@ TEST_CASE("the spatial wrench is Ad_(p^-1)' W_T, METHOD (66)", "[wrench_law]") {
   }
 }
 
-TEST_CASE("the wrench about a point: the spatial wrench seen from there", "[wrench_law]") {
+TEST_CASE("the wrench about a point is the spatial wrench moved to it", "[wrench_law]") {
   RandomValues random(11);
   for (int i = 0; i < 5'000; ++i) {
     const Pose p = random.pose();
@@ -295,13 +295,13 @@ TEST_CASE("the wrench about a point: the spatial wrench seen from there", "[wren
     const Vector6d from_spatial = stacked(shifted(spatial_wrench(p, W_T), c_W));
     REQUIRE((stacked(wrench_about(c_W, p, W_T)) - from_spatial).norm() <=
             2e-14 * (1.0 + from_spatial.norm()));
-    // About the body's own origin only the axes differ.
+    // About the origin of the body only the axes differ.
     const Vector6d own = stacked(expressed(p.rotation, W_T));
     REQUIRE((stacked(wrench_about(p.translation_m, p, W_T)) - own).norm() == 0.0);
   }
 }
 
-TEST_CASE("whatever point it is taken about, the wrench does the same work", "[wrench_law]") {
+TEST_CASE("the work of a wrench does not depend on its point", "[wrench_law]") {
   RandomValues random(12);
   for (int i = 0; i < 2'000; ++i) {
     const Pose p = random.pose();

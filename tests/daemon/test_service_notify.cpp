@@ -88,8 +88,8 @@ TEST_CASE("reloading and stopping are reported once each", "[service_notify]") {
   CHECK(report.next_message(loop(State::disarmed, 10)) == "READY=1\nWATCHDOG=1\n");
   report.stopping("stopping");
   CHECK(report.next_message({}) == "STOPPING=1\nWATCHDOG=1\nSTATUS=stopping\n");
-  report.stopping("refused: x.toml:1:1: no");
-  CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=refused: x.toml:1:1: no\n");
+  report.stopping("rejected: x.toml:1:1: no");
+  CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=rejected: x.toml:1:1: no\n");
 }
 
 /// Replaces the service manager: a socket and the messages sent to it.
@@ -208,7 +208,7 @@ TEST_CASE("wrenchd that does not start reports the reason as status, and is neve
   const TemporaryDirectory dir;
   const std::string file = dir.write("typo.toml", "[servo]\nrat_Hz = 1000\n").string();
   CHECK(run_program("wrenchd", {"--config", file}).exit_code == 1);
-  CHECK(manager.receives("STATUS=refused: " + file + ":2:1: key 'servo.rat_Hz' is not known"));
+  CHECK(manager.receives("STATUS=rejected: " + file + ":2:1: key 'servo.rat_Hz' is not known"));
   CHECK_THAT(manager.all(), !Contains("READY=1"));
 }
 

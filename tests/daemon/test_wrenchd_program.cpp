@@ -262,7 +262,7 @@ TEST_CASE("wrenchd prints help and version") {
   CHECK(help.err == "");
   for (const char* word :
        {"--config", "--scene", "--profile", "--simulate", "--realtime", "--record", "--seconds", "--arm",
-        "--live", "--virtual-time", "Exit codes: 0 stopped on request; 1 refused", "releases the hand"})
+        "--live", "--virtual-time", "Exit codes: 0 stopped on request; 1 rejected", "releases the hand"})
     CHECK(help.out.find(word) != std::string::npos);
   CHECK(run_program("wrenchd", {"--version"}).out.find("wrenchd ") == 0);
 }

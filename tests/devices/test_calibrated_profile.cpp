@@ -50,7 +50,7 @@ TEST_CASE("apply_calibration() adds joint offsets to the joint zeros", "[calibra
 TEST_CASE("a stated reference pose takes precedence over the home position", "[calibrated_profile]") {
   DeviceProfile profile = polhem_profile();
   const Pose home = homing_plan(profile).X_BR;
-  profile.has_rest_pose = true;
+  profile.has_reference_pose = true;
   profile.homing.X_BR = {home.rotation, home.translation_m + Vector3d(0.02, 0.01, -0.03)};
   const Pose X_DE = inverse(profile.X_BD) * profile.homing.X_BR * inverse(profile.X_EH);
   const JointAngles angles = inverse(profile.kinematics, X_DE).value();

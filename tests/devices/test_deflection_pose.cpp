@@ -65,13 +65,13 @@ struct Steered {
   explicit Steered(RunConfig shipped = shipped_config()) : plan(std::move(shipped)) {
     plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_combined.toml",
                                 SearchPath({WRENCHD_SOURCE_DIR "/config"}));
-    station.emplace(plan, link, clock, ProxySearchMode::in_tick);
-    station->open();
+    runtime.emplace(plan, link, clock, ProxySearchMode::in_tick);
+    runtime->open();
   }
   void tick() {
     clock.sleep_until(clock.now() + 1ms);
-    fault = station->loop().tick(clock.now(), clock.now());
-    station->loop().telemetry().latest_record().read(last);
+    fault = runtime->loop().tick(clock.now(), clock.now());
+    runtime->loop().telemetry().latest_record().read(last);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) tick();
@@ -95,7 +95,7 @@ struct Steered {
   VirtualClock clock;
   EmulatedSpaceMouse mouse{EmulatedSpaceMouse::Format::combined};
   LoopbackLink link{mouse, clock};
-  std::optional<Runtime> station;
+  std::optional<Runtime> runtime;
   TickRecord last;
   Fault fault = Fault::none;
 };
@@ -280,17 +280,17 @@ TEST_CASE("a device without motors needs no arming, and its silence is no perman
   CHECK(s.state() == State::disarmed);
   CHECK(s.push_up_N() > 5.0);
 
-  s.station->loop().requests().arm();
+  s.runtime->loop().requests().arm();
   s.ticks(3000);
   CHECK(s.state() == State::active);
   s.mouse.stop_sending();
-  bool told = false;
+  bool reported = false;
   for (int i = 0; i < 2000; ++i) {
     s.tick();
     REQUIRE_FALSE(is_latched(s.state()));
-    told = told || (s.last.faults & bit(Fault::sample_late)) != 0;
+    reported = reported || (s.last.faults & bit(Fault::sample_late)) != 0;
   }
-  CHECK(told);
+  CHECK(reported);
   CHECK(s.state() == State::active);
   CHECK(s.depth_m() < 1e-6);  // the puck is released
 }
@@ -310,13 +310,13 @@ TEST_CASE("the recentre button returns the tool to its initial pose through obst
   s.ticks(50);
   REQUIRE((pose_in(s.last.X_WQ).translation_m - start.translation_m).norm() > 0.05);
   s.mouse.set_buttons(1);
-  bool placed = false;  // and did not move along a path around obstacles
+  bool search_completed = false;  // and did not move along a path around obstacles
   for (int i = 0; i < 50; ++i) {
     s.tick();
-    placed =
-        placed || static_cast<ProxyInitialization>(s.last.proxy_initialization) == ProxyInitialization::found;
+    search_completed = search_completed || static_cast<ProxyInitialization>(s.last.proxy_initialization) ==
+                                               ProxyInitialization::found;
   }
-  CHECK(placed);
+  CHECK(search_completed);
   CHECK((pose_in(s.last.X_WQ).translation_m - start.translation_m).norm() < 1e-9);
   CHECK(pose_in(s.last.X_WQ).rotation.angularDistance(start.rotation) < 1e-9);
   CHECK(s.fault == Fault::none);
@@ -327,10 +327,10 @@ TEST_CASE("a steered session replays with the same bits", "[deflection_pose][rep
   const auto file = directory.path() / "run.h5";
   Steered s;
   {
-    RunRecorder recorder(*s.station, file);
+    RunRecorder recorder(*s.runtime, file);
     s.ticks(300);
     recorder.append_new_ticks();
-    s.station->loop().requests().arm();
+    s.runtime->loop().requests().arm();
     for (const std::array<int, 6>& push :
          {kUp, kDown, {200, 40, 350, 90, 0, -200}, {}, {0, 300, 0, 350, 0, 0}}) {
       s.mouse.set_deflection(push);
@@ -376,14 +376,14 @@ TEST_CASE("the simulated hand observes the displayed tool and steers it along it
                               SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
-  Runtime station(plan, *link, clock, ProxySearchMode::in_tick);
-  station.open();
+  Runtime runtime(plan, *link, clock, ProxySearchMode::in_tick);
+  runtime.open();
   TickRecord last;
   double pressed_m = 0.0, farthest_m = 0.0;
   for (int i = 0; i < 36000; ++i) {  // three times along the path: the penetration does not accumulate
     clock.sleep_until(clock.now() + 1ms);
-    REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().telemetry().latest_record().read(last);
+    REQUIRE(runtime.loop().tick(clock.now(), clock.now()) == Fault::none);
+    runtime.loop().telemetry().latest_record().read(last);
     if (i < 2000) continue;  // it starts in the table
     const Pose p = pose_in(last.X_WP), q = pose_in(last.X_WQ);
     pressed_m = std::max(pressed_m, (p.translation_m - q.translation_m).norm());

@@ -17,6 +17,10 @@
 namespace wrenchd {
 namespace {
 
+bool is_done(const Homing& homing) {
+  return homing.state().step == HomingStep::done;
+}
+
 using namespace test;
 
 /// A device in an operator's hand, 1000 samples per second, with optional errors.
@@ -92,7 +96,7 @@ TEST_CASE("a correct device is homed when the operator follows the instructions"
   Bench bench;
   CHECK(operator_instruction(bench.state()) == "Waiting for the device to report.");
   bench.follow_all_instructions();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
   const std::vector<std::string> expected = {
       "Hold the handle still.", "Push the handle straight away from you.",
       "Hold the handle still.", "Move the handle straight to the left.",
@@ -126,7 +130,7 @@ TEST_CASE("homing is not done before every axis has moved", "[homing]") {
     // Long enough for the request of the stuck axis, and some more.
     for (int i = 0; i < 200; ++i) bench.follow_instruction();
     INFO("axis " << stuck);
-    CHECK_FALSE(bench.homing.may_arm());
+    CHECK_FALSE(is_done(bench.homing));
   }
   Bench idle;
   idle.hold(100.0);
@@ -150,7 +154,7 @@ TEST_CASE("after an operator error homing asks once more", "[homing]") {
   bench.move(2, 0.03);
   CHECK(operator_instruction(bench.state()) == "That moved z, not y. Hold the handle still.");
   bench.follow_all_instructions();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
 }
 
 TEST_CASE("the return to the centre does not count as the next axis", "[homing]") {
@@ -165,7 +169,7 @@ TEST_CASE("the return to the centre does not count as the next axis", "[homing]"
   CHECK(bench.state().step == HomingStep::holding_still);
   CHECK(bench.state().problem == HomingProblem::none);
   bench.follow_all_instructions();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
 }
 
 TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
@@ -197,7 +201,7 @@ TEST_CASE("homing detects exchanged axes", "[homing]") {
   CHECK(operator_instruction(bench.state()) ==
         "Homing failed. That moved z, not y. Axes are exchanged: check their order in the profile, and the "
         "plugs of the encoders.");
-  CHECK_FALSE(bench.homing.may_arm());
+  CHECK_FALSE(is_done(bench.homing));
 
   Bench turns;  // y and z of the quaternion exchanged
   turns.spoil = [](DeviceSample& s) { std::swap(s.X_BH.rotation.y(), s.X_BH.rotation.z()); };
@@ -221,7 +225,7 @@ TEST_CASE("homing detects a velocity with the wrong sign and accepts a device wi
   Bench silent;
   silent.spoil = [](DeviceSample& s) { s.V_BH = {}; };
   silent.follow_all_instructions();
-  CHECK(silent.homing.may_arm());
+  CHECK(is_done(silent.homing));
 }
 
 TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
@@ -236,7 +240,7 @@ TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
       s.X_BH.translation_m += random.vector<3>(2e-5);
     };
     bench.follow_all_instructions();
-    REQUIRE(bench.homing.may_arm());
+    REQUIRE(is_done(bench.homing));
     CHECK((bench.homing.offset().position_m - off.position_m).norm() < 1e-5);
     CHECK((bench.homing.offset().rotation_rad - off.rotation_rad).norm() < 1e-9);
     DeviceSample raw = bench.sample({});
@@ -355,7 +359,7 @@ TEST_CASE("a pose outside the workspace fails homing", "[homing]") {
     bench.homing.restart();
     bench.X_BH.translation_m.z() = 0.1;
     bench.follow_all_instructions();
-    CHECK(bench.homing.may_arm());
+    CHECK(is_done(bench.homing));
   }
 }
 
@@ -388,13 +392,13 @@ TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing
   CHECK(bench.state().step == HomingStep::awaiting_sample);
   fault = Fault::none;
   bench.follow_all_instructions();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
   fault = Fault::overspeed;  // the servo loop handles the consequences
   bench.tick();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
   fault = Fault::device_lost;
   bench.tick();
-  CHECK_FALSE(bench.homing.may_arm());
+  CHECK_FALSE(is_done(bench.homing));
 }
 
 /// The simulated device with its reports, in a hand that performs all motions that homing requests, in order.
@@ -470,17 +474,17 @@ TEST_CASE("homing asks only for sensed axes", "[homing]") {
   plan.sensed = {true, true, true, false, false, false};
   Bench bench(plan);
   bench.follow_all_instructions();
-  CHECK(bench.homing.may_arm());
+  CHECK(is_done(bench.homing));
   CHECK(bench.instructions.size() == 8);
   plan.sensed = {false, false, false, false, false, true};
   Bench turn(plan);
   turn.follow_all_instructions();
-  CHECK(turn.homing.may_arm());
+  CHECK(is_done(turn.homing));
   CHECK(turn.instructions.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
 }
 
 TEST_CASE("an invalid homing plan is rejected", "[homing]") {
-  const auto refused = [](const std::function<void(HomingPlan&)>& spoil) {
+  const auto rejected = [](const std::function<void(HomingPlan&)>& spoil) {
     HomingPlan plan;
     spoil(plan);
     try {
@@ -491,16 +495,16 @@ TEST_CASE("an invalid homing plan is rejected", "[homing]") {
     return false;
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK_FALSE(refused([](HomingPlan&) {}));
-  CHECK(refused([](HomingPlan& p) { p.sensed = {}; }));
-  CHECK(refused([](HomingPlan& p) { p.travel_m = 0.0; }));
-  CHECK(refused([=](HomingPlan& p) { p.travel_m = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.travel_rad = 3.0; }));
-  CHECK(refused([](HomingPlan& p) { p.workspace_max_m.y() = -1.0; }));
-  CHECK(refused([=](HomingPlan& p) { p.workspace_min_m.x() = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.max_rotation_rad = 0.1; }));
-  CHECK(refused([=](HomingPlan& p) { p.max_offset_m = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
+  CHECK_FALSE(rejected([](HomingPlan&) {}));
+  CHECK(rejected([](HomingPlan& p) { p.sensed = {}; }));
+  CHECK(rejected([](HomingPlan& p) { p.travel_m = 0.0; }));
+  CHECK(rejected([=](HomingPlan& p) { p.travel_m = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.travel_rad = 3.0; }));
+  CHECK(rejected([](HomingPlan& p) { p.workspace_max_m.y() = -1.0; }));
+  CHECK(rejected([=](HomingPlan& p) { p.workspace_min_m.x() = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.max_rotation_rad = 0.1; }));
+  CHECK(rejected([=](HomingPlan& p) { p.max_offset_m = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
 }
 
 TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
@@ -525,7 +529,7 @@ TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
     const RealtimeGuard guard;
     homing.advance(sample, now);
     forbidden += guard.allocations() + guard.locks();
-    armed += homing.may_arm();
+    armed += is_done(homing);
   }
   CHECK(forbidden == 0);
   CHECK(armed == 0);  // noise is no motion of the hand

@@ -510,7 +510,7 @@ TEST_CASE("release sends five zero wrenches with the motors off, in every state"
 
 TEST_CASE("an invalid profile is rejected before the link is opened") {
   using Catch::Contains;
-  const auto refuses = [](const std::function<void(DeviceProfile&)>& spoil, const std::string& word) {
+  const auto rejects = [](const std::function<void(DeviceProfile&)>& spoil, const std::string& word) {
     DeviceProfile profile = kProfile;
     spoil(profile);
     ScriptedLink link;
@@ -518,13 +518,13 @@ TEST_CASE("an invalid profile is rejected before the link is opened") {
     CHECK_THROWS_WITH(device.open(), Contains("loopback") && Contains(word));
     CHECK(link.opened == 0);
   };
-  refuses([](DeviceProfile& p) { p.max_force_N = DeviceProfile::kNotStated; }, "max_force_N");
-  refuses([](DeviceProfile& p) { p.max_torque_Nm = -1; }, "max_torque_Nm");
-  refuses([](DeviceProfile& p) { p.max_linear_speed_m_per_s = 0; }, "max_linear_speed");
-  refuses([](DeviceProfile& p) { p.max_angular_speed_rad_per_s = 0; }, "max_angular_speed");
-  refuses([](DeviceProfile& p) { p.stale_fault_s = DeviceProfile::kNotStated; }, "stale_fault_s");
-  refuses([](DeviceProfile& p) { p.pose_report.position.byte = 20; }, "overlaps");
-  refuses([](DeviceProfile& p) { p.wrench_report.torque.present = false; }, "torque");
+  rejects([](DeviceProfile& p) { p.max_force_N = DeviceProfile::kNotStated; }, "max_force_N");
+  rejects([](DeviceProfile& p) { p.max_torque_Nm = -1; }, "max_torque_Nm");
+  rejects([](DeviceProfile& p) { p.max_linear_speed_m_per_s = 0; }, "max_linear_speed");
+  rejects([](DeviceProfile& p) { p.max_angular_speed_rad_per_s = 0; }, "max_angular_speed");
+  rejects([](DeviceProfile& p) { p.stale_fault_s = DeviceProfile::kNotStated; }, "stale_fault_s");
+  rejects([](DeviceProfile& p) { p.pose_report.position.byte = 20; }, "overlaps");
+  rejects([](DeviceProfile& p) { p.wrench_report.torque.present = false; }, "torque");
 }
 
 TEST_CASE("a device with keep-alive gets it at its period, and its shutdown report at the end") {

@@ -317,7 +317,7 @@ TEST_CASE("a million mutated and random descriptors are fully accepted or reject
       check_sound(parse_report_descriptor(bytes));
       ++accepted;
     } catch (const DescriptorError& error) {
-      if (error.at() > bytes.size()) FAIL("refused at a byte that is not there");
+      if (error.at() > bytes.size()) FAIL("rejected at a byte that is not there");
     }
   }
   CHECK(accepted > cases / 20);  // both outcomes are frequent

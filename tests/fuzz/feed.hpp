@@ -10,8 +10,8 @@
 
 namespace wrenchd::test {
 
-/// The bytes of one fuzzed input, taken from the front. When they are used up everything reads as zero, so
-/// that every input is a whole one.
+/// Reads the bytes of a fuzzed input from the front. Behind the last byte all reads return zero, so every
+/// input is valid.
 class Feed {
  public:
   explicit Feed(std::span<const std::uint8_t> bytes) : rest_(bytes) {}
@@ -25,14 +25,14 @@ class Feed {
     rest_ = rest_.subspan(1);
     return first;
   }
-  /// -128 to 127
+  /// Returns -128 to 127.
   int signed_byte() noexcept { return static_cast<std::int8_t>(byte()); }
-  /// Two bytes, little-endian, as -32768 to 32767.
+  /// Returns two bytes, little-endian, as -32768 to 32767.
   int signed_word() noexcept {
     const unsigned low = byte(), high = byte();
     return static_cast<std::int16_t>(low | (high << 8));
   }
-  /// Fills all of `out`.
+  /// Fills `out` with the next bytes.
   void fill(std::span<std::uint8_t> out) noexcept {
     for (std::uint8_t& b : out) b = byte();
   }
@@ -41,10 +41,10 @@ class Feed {
   std::span<const std::uint8_t> rest_;
 };
 
-/// A law that does not hold is a finding: it is told, and the run ends where the fuzzer sees it.
-inline void hold(bool law, const char* words) {
-  if (law) return;
-  std::fprintf(stderr, "does not hold: %s\n", words);
+/// Prints the requirement and aborts if the condition is false; the fuzzer stores the input as a finding.
+inline void require(bool condition, const char* requirement) {
+  if (condition) return;
+  std::fprintf(stderr, "violated: %s\n", requirement);
   std::abort();
 }
 

@@ -5,10 +5,17 @@
 
 namespace wrenchd::test {
 
-/// What the first byte of an input of fuzz_config makes of the rest.
-enum class FileKind : std::uint8_t { settings, scene, profile, hand_script, calibration, sealed_calibration };
+/// Kind of file that fuzz_config reads the input as; selected by the first byte.
+enum class FileKind : std::uint8_t {
+  settings,
+  scene,
+  profile,
+  hand_script,
+  calibration,
+  calibration_without_checksum
+};
 inline constexpr unsigned kFileKinds = 6;
-/// The one mesh that lies beside the input.
+/// Name of the only mesh file in the directory of the input.
 inline constexpr const char* kMeshName = "cube.off";
 
 }  // namespace wrenchd::test

@@ -3,7 +3,6 @@
 // daemon/servo/link_watch.cpp daemon/servo/pose_watch.cpp daemon/servo/motor_watch.cpp
 // daemon/servo/write_watch.cpp daemon/servo/pace_watch.cpp daemon/servo/motor_stall_watch.cpp
 // daemon/servo/client_watch.cpp daemon/servo/self_test.cpp
-#include <bit>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -12,15 +11,15 @@
 #include "daemon/servo/self_test.hpp"
 #include "daemon/servo/watches.hpp"
 
-// Sequences of events: each tick takes a few bytes for what the device says and what is asked, the watches
-// find what they find, the machine follows. Whatever the sequence, force is in four states, rises in one, and
-// a latch opens only when somebody opens it.
+// Sequences of samples, faults and commands through the fault detectors, the self-test and the state machine.
+// For every sequence: authority is positive in driving states only, it rises in State::ramping only, and a
+// latched state ends only by a command.
 
 namespace {
 
 using namespace wrenchd;
 
-/// Bytes as they come; zeros behind their end.
+/// The bytes of the input; zeros behind its end.
 class Bytes {
  public:
   Bytes(const std::uint8_t* data, std::size_t size) : at_(data), end_(data + size) {}
@@ -97,8 +96,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     t.faults = pace.check(now, Duration{0});
     t.recently_late = pace.recently_late(now);
     const FaultSet found = t.faults | watches.check(sample, machine.state(), driven, t);
-    for (FaultSet left = found; left != 0; left &= left - 1)
-      machine.on(static_cast<Fault>(std::countr_zero(left)));
+    for (FaultSet left = found; left != 0; left &= left - 1) machine.on(first_fault(left));
     if (const Fault overdue = machine.overdue(); overdue != Fault::none) machine.on(overdue);
     if (machine.state() == State::self_test) {
       if (!testing) test.start(now);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: collision/meshes/mesh_file.cpp collision/meshes/mesh_validation.cpp
-// collision/meshes/ply_validation.cpp collision/meshes/mesh_source.cpp collision/meshes/mesh_repair.cpp
-// collision/meshes/mesh_check.cpp collision/meshes/half_edges.cpp
+// Under test: collision/meshes/mesh_file.cpp collision/meshes/obj_reader.cpp
+// collision/meshes/off_reader.cpp collision/meshes/ply_reader.cpp collision/meshes/stl_reader.cpp
+// collision/meshes/mesh_source.cpp collision/meshes/mesh_repair.cpp collision/meshes/mesh_check.cpp
+// collision/meshes/half_edges.cpp
 #include "tests/fuzz/fuzz_mesh.hpp"
 
 #include <string>
@@ -12,8 +13,8 @@
 #include "core/finite.hpp"
 #include "tests/fuzz/feed.hpp"
 
-// Any bytes as a mesh file: refused with a MeshError, found defective, or a mesh of finite points whose
-// triangles are there. Time and memory are bounded by the options of the run.
+// Reads any bytes as a mesh file. The reader throws MeshError, or the check reports defects, or the mesh has
+// finite points and valid indices. The options of the run limit time and memory.
 
 namespace {
 
@@ -21,10 +22,11 @@ using namespace wrenchd;
 using namespace wrenchd::test;
 
 void check_mesh(const TriangleMesh& mesh) {
-  hold(!mesh.triangles.empty(), "a mesh has triangles");
-  for (const Vector3d& v : mesh.vertices_m) hold(is_finite(v), "points are finite");
+  require(!mesh.triangles.empty(), "a valid mesh has triangles");
+  for (const Vector3d& v : mesh.vertices_m) require(is_finite(v), "points are finite");
   for (const auto& triangle : mesh.triangles)
-    for (const auto corner : triangle) hold(corner < mesh.vertices_m.size(), "corners are there");
+    for (const auto corner : triangle)
+      require(corner < mesh.vertices_m.size(), "vertex indices are in range");
 }
 
 void load(MeshSource source, BodyKind kind) {
@@ -35,21 +37,21 @@ void load(MeshSource source, BodyKind kind) {
   if (report.defects.empty())
     check_mesh(mesh);
   else
-    hold(!report.defects.front().empty(), "a defect has words");
+    require(!report.defects.front().empty(), "a defect has a description");
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Feed feed({data, size});
-  const unsigned what = feed.byte() % (2 * kMeshFormats.size());
-  if (feed.empty()) return 0;  // an empty file is refused before it is parsed
-  MeshSource source{std::string("input") + kMeshFormats[what % kMeshFormats.size()],
+  const unsigned selection = feed.byte() % (2 * kMeshFormats.size());
+  if (feed.empty()) return 0;  // read_mesh_source() rejects empty files
+  MeshSource source{std::string("input") + kMeshFormats[selection % kMeshFormats.size()],
                     std::string(feed.rest().begin(), feed.rest().end())};
   try {
-    load(std::move(source), what < kMeshFormats.size() ? BodyKind::solid : BodyKind::surface);
+    load(std::move(source), selection < kMeshFormats.size() ? BodyKind::solid : BodyKind::surface);
   } catch (const MeshError& error) {
-    hold(std::string(error.what()).starts_with("input."), "a refusal names the file");
+    require(std::string(error.what()).starts_with("input."), "a MeshError names the file");
   }
   return 0;
 }

@@ -5,7 +5,7 @@
 
 namespace wrenchd::test {
 
-/// The first byte of an input of fuzz_mesh, modulo 8: format, and 4 more for a surface.
+/// Mesh formats that fuzz_mesh selects by the first byte modulo 8: 0 to 3 as a solid, 4 to 7 as a surface.
 inline constexpr std::array<const char*, 4> kMeshFormats = {".off", ".obj", ".stl", ".ply"};
 
 }  // namespace wrenchd::test

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: devices/profile_device.cpp devices/report_codec.cpp devices/kinematics.cpp
+// Under test: devices/profile_device.cpp devices/profile_reports.cpp devices/report_codec.cpp
+// devices/report_frame.cpp devices/report_bits.cpp devices/layout_validation.cpp devices/kinematics.cpp
 // devices/deflection_pose.cpp
 #include "tests/fuzz/fuzz_report.hpp"
 
@@ -13,8 +14,9 @@
 #include "tests/fuzz/feed.hpp"
 #include "tests/fuzz/memory_link.hpp"
 
-// Reports, silences, commands and lost links in any order, for each shipped profile, over a link in memory.
-// Whatever comes, the sample stays a pose, counters and clocks only rise, and no command exceeds the profile.
+// Reports, pauses, commands and lost links in any order, for each shipped profile, over a link in memory. For
+// every order the sample is a valid pose, counters and clocks never decrease, and no command exceeds the
+// limits of the profile.
 
 namespace {
 
@@ -23,11 +25,11 @@ using namespace wrenchd::test;
 
 const std::vector<DeviceProfile>& profiles() {
   static const KnownProfiles known = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
-  hold(known.refused.empty() && !known.profiles.empty(), "every shipped profile loads");
+  require(known.rejected.empty() && !known.profiles.empty(), "every shipped profile is valid");
   return known.profiles;
 }
 
-/// Looks at each command as the device would.
+/// Decodes each command as the firmware does, and checks it against the limits of the profile.
 class Firmware final : public MemoryLink {
  public:
   explicit Firmware(const DeviceProfile& profile) : profile_(profile) {
@@ -46,20 +48,20 @@ class Firmware final : public MemoryLink {
 
   void take_command(std::span<const std::uint8_t> bytes) noexcept override {
     if (is_fixed(bytes)) return;
-    hold(profile_.has_output, "nothing is written to a device that takes nothing");
+    require(profile_.has_output, "a device without output receives no commands");
     const WrenchReportLayout& layout = profile_.wrench_report;
-    hold(bytes.size() == layout.length, "a command has its length");
-    const auto [outcome, report] = decode(layout, bytes);
-    hold(outcome == Decoding::ok, "a command is one");
+    require(bytes.size() == layout.length, "a command has the length of its layout");
+    const auto [result, report] = decode(layout, bytes);
+    require(result == Decoding::ok, "a command can be decoded");
     const bool off = layout.enable.present && !report.enable;
     const double force_N = off ? 0.0 : authority_ * profile_.max_force_N;
     const double torque_Nm = off || !layout.torque.present ? 0.0 : authority_ * profile_.max_torque_Nm;
-    if (layout.force.present) hold(report.F.force_N.norm() <= force_N + kRounding, "max_force_N");
-    if (layout.torque.present) hold(report.F.torque_Nm.norm() <= torque_Nm + kRounding, "max_torque_Nm");
+    if (layout.force.present) require(report.F.force_N.norm() <= force_N + kRounding, "max_force_N");
+    if (layout.torque.present) require(report.F.torque_Nm.norm() <= torque_Nm + kRounding, "max_torque_Nm");
     if (!layout.efforts.present) return;
     const double most = off ? 0.0 : profile_.kinematics.max_effort;
     for (const double effort : report.efforts)
-      hold(std::abs(effort) <= most + std::abs(layout.efforts.step), "max_effort");
+      require(std::abs(effort) <= most + std::abs(layout.efforts.step), "max_effort");
   }
 
   static constexpr double kRounding = 1e-9;
@@ -83,14 +85,15 @@ void fix_frame(const ReportFrame& frame, std::span<std::uint8_t> bytes) {
   if (crc) bytes[slot + 1] = static_cast<std::uint8_t>(sum >> 8);
 }
 
-/// One life of a device and its host.
-class Life {
+/// A device and its host, from open() to close().
+class Session {
  public:
-  explicit Life(const DeviceProfile& profile) : profile_(profile), link_(profile), device_(profile, link_) {
+  explicit Session(const DeviceProfile& profile)
+      : profile_(profile), link_(profile), device_(profile, link_) {
     open();
   }
 
-  void live(Feed feed) {
+  void run(Feed feed) {
     while (!feed.empty()) step(feed);
     device_.release(now_);
     read();
@@ -101,13 +104,13 @@ class Life {
  private:
   void open() {
     device_.open();
-    seen_ = {};
-    read_once_ = false;
+    previous_ = {};
+    has_previous_ = false;
   }
 
   void step(Feed& feed) {
     switch (static_cast<Step>(feed.byte() % kSteps)) {
-      case Step::pass: {
+      case Step::advance: {
         const unsigned b = feed.byte();
         now_ += std::chrono::microseconds((1 + b % 16) << (b / 16));
         break;
@@ -157,22 +160,22 @@ class Life {
     link_.arrive(now_, report);
   }
 
-  /// A little further than the last one; then up to three bytes are spoilt.
+  /// Sends the previous report with small changes; then corrupts up to three of its bytes.
   void send_plausible(Feed& feed) {
     const PoseReportLayout& kind = layout(feed.byte());
-    const auto little = [&](double step) { return step * feed.signed_byte(); };
+    const auto small = [&](double step) { return step * feed.signed_byte(); };
     next_.sequence += static_cast<std::uint64_t>(static_cast<std::int64_t>(1 + feed.signed_byte()));
     if (kind.device_time.present)
       next_.device_time += static_cast<std::uint64_t>(
           static_cast<std::int64_t>(1e-5 * feed.signed_word() / kind.device_time.step));
     for (int i = 0; i < 3; ++i) {
-      next_.X_BH.translation_m[i] += little(1e-4);
-      next_.translation_m[i] = little(1e-4);
-      next_.rotation_rad[i] = little(1e-3);
-      next_.V_BH.linear_m_per_s[i] = little(2e-2);
-      next_.V_BH.angular_rad_per_s[i] = little(0.5);
+      next_.X_BH.translation_m[i] += small(1e-4);
+      next_.translation_m[i] = small(1e-4);
+      next_.rotation_rad[i] = small(1e-3);
+      next_.V_BH.linear_m_per_s[i] = small(2e-2);
+      next_.V_BH.angular_rad_per_s[i] = small(0.5);
     }
-    next_.X_BH.rotation = Quaterniond(1.0, little(4e-3), little(4e-3), little(4e-3));
+    next_.X_BH.rotation = Quaterniond(1.0, small(4e-3), small(4e-3), small(4e-3));
     for (double& counts : next_.joints) counts += feed.signed_byte();
     const unsigned flags = feed.byte();
     next_.motors_on = (flags & 1U) != 0;
@@ -182,14 +185,14 @@ class Life {
     next_.acknowledged = device_.commands_sent() - (flags >> 5);
     std::array<std::uint8_t, kMaxReportBytes> bytes;
     const auto report = std::span(bytes).first(encode(kind, next_, bytes));
-    for (unsigned spoils = (flags >> 3) & 1U ? feed.byte() % 4 : 0; spoils > 0; --spoils)
+    for (unsigned corruptions = (flags >> 3) & 1U ? feed.byte() % 4 : 0; corruptions > 0; --corruptions)
       report[feed.byte() % report.size()] ^= feed.byte();
     fix_frame(kind, report);
     link_.arrive(now_, report);
   }
 
   void command(Feed& feed) {
-    constexpr std::array<double, 5> kStrange = {std::numeric_limits<double>::quiet_NaN(),
+    constexpr std::array<double, 5> kExtreme = {std::numeric_limits<double>::quiet_NaN(),
                                                 std::numeric_limits<double>::infinity(), 1e300, -1e300,
                                                 5e-324};
     const unsigned flags = feed.byte();
@@ -199,21 +202,21 @@ class Life {
       F.force_N[i] = scale * feed.signed_word();
       F.torque_Nm[i] = 1e-2 * scale * feed.signed_word();
     }
-    const unsigned strange = flags >> 3;
-    if (strange != 0)
-      (strange % 2 == 0 ? F.force_N : F.torque_Nm)[strange % 3] = kStrange[strange % kStrange.size()];
+    const unsigned extreme = flags >> 3;
+    if (extreme != 0)
+      (extreme % 2 == 0 ? F.force_N : F.torque_Nm)[extreme % 3] = kExtreme[extreme % kExtreme.size()];
     const bool finite = is_finite(F);
     const Fault fault = device_.write(now_, F, (flags & 1U) != 0);
-    hold(finite || fault == Fault::wrench_not_finite, "what is not finite is refused");
+    require(finite || fault == Fault::wrench_not_finite, "a wrench that is not finite is rejected");
   }
 
   void change_link(unsigned how) {
     switch (how % 6) {
       case 0:
-        link_.reading = link_.writing = LinkStatus::gone;
+        link_.reading = link_.writing = LinkStatus::disconnected;
         break;
       case 1:
-        link_.writing = LinkStatus::empty;
+        link_.writing = LinkStatus::not_ready;
         break;
       case 2:
         link_.writing = LinkStatus::ok;
@@ -232,20 +235,20 @@ class Life {
 
   void read() {
     const DeviceSample s = device_.read_newest(now_);
-    hold(is_finite(s.X_BH) && is_finite(s.V_BH), "pose and velocity are finite");
-    hold(std::abs(s.X_BH.rotation.squaredNorm() - 1.0) < 1e-9, "the rotation is one");
-    hold(is_finite(s.device_time_s), "device time is finite");
-    hold(s.acknowledged <= device_.commands_sent(), "nobody takes a command that was not sent");
-    hold(s.skipped + s.rejected <= unsigned{ProfileDevice::kMostReportsPerRead},
-         "reports a read are bounded");
-    hold(s.arrived <= now_, "nothing arrives later than now");
-    if (read_once_) {
-      hold(s.device_time_s >= seen_.device_time_s, "device time does not step back");
-      hold(s.sequence >= seen_.sequence, "the sequence does not step back");
-      hold(s.arrived >= seen_.arrived, "arrivals do not step back");
+    require(is_finite(s.X_BH) && is_finite(s.V_BH), "pose and velocity are finite");
+    require(std::abs(s.X_BH.rotation.squaredNorm() - 1.0) < 1e-9, "the quaternion has unit length");
+    require(is_finite(s.device_time_s), "device time is finite");
+    require(s.acknowledged <= device_.commands_sent(), "only sent commands are acknowledged");
+    require(s.superseded + s.rejected <= unsigned{ProfileDevice::kMaxReportsPerRead},
+            "the number of reports per read is limited");
+    require(s.arrived <= now_, "no report arrives in the future");
+    if (has_previous_) {
+      require(s.device_time_s >= previous_.device_time_s, "device time does not decrease");
+      require(s.sequence >= previous_.sequence, "the sequence does not decrease");
+      require(s.arrived >= previous_.arrived, "arrival times do not decrease");
     }
-    seen_ = s;
-    read_once_ = true;
+    previous_ = s;
+    has_previous_ = true;
   }
 
   const DeviceProfile& profile_;
@@ -253,8 +256,8 @@ class Life {
   ProfileDevice device_;
   TimePoint now_ = TimePoint{} + std::chrono::seconds(1);
   PoseReport next_;
-  DeviceSample seen_;
-  bool read_once_ = false;
+  DeviceSample previous_;
+  bool has_previous_ = false;
 };
 
 }  // namespace
@@ -262,6 +265,6 @@ class Life {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Feed feed({data, size});
   const auto& known = profiles();
-  Life(known[feed.byte() % known.size()]).live(feed);
+  Session(known[feed.byte() % known.size()]).run(feed);
   return 0;
 }

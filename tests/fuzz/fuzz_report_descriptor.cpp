@@ -6,8 +6,8 @@
 #include "devices/report_descriptor.hpp"
 #include "devices/six_axes.hpp"
 
-/// Any bytes as a report descriptor: read, or refused at a byte that is there; and what is read can be
-/// searched for axes and held against a profile. Everything else is a finding.
+/// Reads any bytes as a report descriptor. The parser returns a descriptor that find_six_axes() and
+/// find_differences() accept, or throws DescriptorError with an offset inside the bytes.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace wrenchd;
   static const std::vector<ExpectedReport> kExpected = {
@@ -21,9 +21,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (field.end_bit() > 8 * report.length) std::abort();
         if (field.usage(field.count - 1).has_value() == field.usages.empty()) std::abort();
       }
-    const SixAxesFound found = find_six_axes(descriptor);
-    if (found.device.has_value() != found.why_not.empty()) std::abort();
-    static_cast<void>(differences(descriptor, kExpected));
+    const SixAxisResult result = find_six_axes(descriptor);
+    if (result.controller.has_value() != result.rejection.empty()) std::abort();
+    static_cast<void>(find_differences(descriptor, kExpected));
   } catch (const DescriptorError& error) {
     if (error.at() > size) std::abort();
   }

@@ -11,8 +11,8 @@
 #include "daemon/control/json_rpc.hpp"
 #include "tests/fuzz/feed.hpp"
 
-// Any bytes as lines of the control socket, from somebody of any role: refused with a reply that is one line
-// of JSON, or a request that the method it names may rely on.
+// Reads any bytes as lines of the control socket, from clients of any role. A line is rejected with one line
+// of JSON, or its request has the parameters that the method requires.
 
 namespace {
 
@@ -23,64 +23,67 @@ using namespace wrenchd::test;
 MethodTable make_table() {
   MethodTable table;
   const auto keep = [](const Json& params, const Caller& caller) {
-    hold(caller.role >= Role::operator_, "nobody below an operator runs it");
-    hold(params.is_object(), "parameters are an object");
-    hold(params.contains("name") && params["name"].is_string(), "what is required is there, of its type");
-    hold(params["name"].get<std::string>().find('\0') == std::string::npos, "no text holds a zero");
+    require(caller.role >= Role::operator_, "the role is at least operator");
+    require(params.is_object(), "parameters are an object");
+    require(params.contains("name") && params["name"].is_string(),
+            "required parameters exist and have their type");
+    require(params["name"].get<std::string>().find('\0') == std::string::npos, "texts have no zero byte");
     for (const auto& [name, value] : params.items()) {
       if (name == "duration_s")
-        hold(value.is_number() && std::isfinite(value.get<double>()), "numbers are finite");
+        require(value.is_number() && std::isfinite(value.get<double>()), "numbers are finite");
       if (name == "position_m") {
-        hold(value.is_array() && value.size() == 3, "a vector has three");
-        for (const Json& x : value) hold(std::isfinite(x.get<double>()), "finite ones");
+        require(value.is_array() && value.size() == 3, "a vector has three numbers");
+        for (const Json& x : value) require(std::isfinite(x.get<double>()), "numbers of a vector are finite");
       }
       if (name == "count") static_cast<void>(value.get<std::int64_t>());
       if (name == "names")
         for (const Json& text : value) static_cast<void>(text.get<std::string>());
     }
-    return Answer(params);
+    return MethodResult(params);
   };
   table.add(MethodRow{"scene.move",
                       Role::operator_,
-                      {{"name", ParamType::text, true, "which"},
-                       {"position_m", ParamType::vector, false, "where"},
-                       {"duration_s", ParamType::number, false, "how fast"},
-                       {"count", ParamType::integer, false, "how often"},
-                       {"names", ParamType::texts, false, "others"},
-                       {"at_once", ParamType::boolean, false, "at once"},
-                       {"more", ParamType::object, false, "more"}},
+                      {{"name", ParamType::text, true, "Name."},
+                       {"position_m", ParamType::vector, false, "Position."},
+                       {"duration_s", ParamType::number, false, "Duration."},
+                       {"count", ParamType::integer, false, "Count."},
+                       {"names", ParamType::texts, false, "Other names."},
+                       {"at_once", ParamType::boolean, false, "Immediately."},
+                       {"more", ParamType::object, false, "Other values."}},
                       "Moves.",
                       keep});
   table.add(MethodRow{"stop", Role::observer, {}, "Stops.", [](const Json& params, const Caller&) {
-                        hold(params.empty(), "it takes no parameters");
-                        return Answer(Json::object());
+                        require(params.empty(), "stop has no parameters");
+                        return MethodResult(Json::object());
                       }});
   return table;
 }
 
-/// What goes out is one line of JSON-RPC.
+/// Requires that a reply is one line of JSON-RPC.
 void check_line(const std::string& line) {
-  hold(!line.empty() && line.find('\n') == line.size() - 1, "one line");
-  const Json told = Json::parse(line, nullptr, false);
-  hold(told.is_object() && told["jsonrpc"] == "2.0" && told.contains("id"), "of JSON-RPC");
-  hold(told.contains("result") != told.contains("error"), "with a result or an error");
-  if (!told.contains("error")) return;
-  hold(told["error"]["code"].is_number_integer(), "an error has a code");
-  const auto sentence = told["error"]["message"].get<std::string>();
-  hold(sentence.size() > 10 && (sentence.back() == '.' || sentence.back() == '?'), "and a sentence");
+  require(!line.empty() && line.find('\n') == line.size() - 1, "a reply is one line");
+  const Json reply = Json::parse(line, nullptr, false);
+  require(reply.is_object() && reply["jsonrpc"] == "2.0" && reply.contains("id"),
+          "a reply is JSON-RPC 2.0 with an id");
+  require(reply.contains("result") != reply.contains("error"), "a reply has either a result or an error");
+  if (!reply.contains("error")) return;
+  require(reply["error"]["code"].is_number_integer(), "an error has a code");
+  const auto sentence = reply["error"]["message"].get<std::string>();
+  require(sentence.size() > 10 && (sentence.back() == '.' || sentence.back() == '?'),
+          "an error has a sentence");
 }
 
 void serve(const MethodTable& table, std::string_view line, Role role) {
-  const auto read = read_request(line);
-  if (const auto* refused = std::get_if<RefusedLine>(&read))
-    return check_line(error_line(refused->id, refused->error));
-  const auto& request = std::get<RpcRequest>(read);
-  hold(line.size() <= kMaxLineBytes, "no line is longer than allowed");
-  hold(request.params.is_object(), "parameters are an object");
-  hold(request.wants_reply == !request.id.is_null(), "who wants a reply has an id");
+  const auto parsed = parse_request(line);
+  if (const auto* invalid = std::get_if<InvalidRequest>(&parsed))
+    return check_line(error_line(invalid->id, invalid->error));
+  const auto& request = std::get<RpcRequest>(parsed);
+  require(line.size() <= kMaxLineBytes, "longer lines are rejected");
+  require(request.params.is_object(), "parameters are an object");
+  require(request.wants_reply == !request.id.is_null(), "a request has an id exactly if it wants a reply");
   try {
     const MethodRow& row = table.look_up(request, role);
-    hold(role >= row.least, "the role is enough");
+    require(role >= row.min_role, "the role is sufficient");
     check_line(reply_line(request.id, MethodTable::run(row, request.params, {1, role, "", nullptr}).result));
   } catch (const RpcError& error) {
     check_line(error_line(request.id, error));

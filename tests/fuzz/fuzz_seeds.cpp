@@ -19,8 +19,8 @@
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-// What a fuzzer starts from: DIRECTORY gets small good inputs, DIRECTORY.dict the words of their language.
-// All of it is made of what is shipped and what the tests use.
+// Writes the initial corpus of a fuzz target: small valid inputs into DIRECTORY, and a dictionary of words
+// into DIRECTORY.dict. The inputs come from the shipped files and from the samples of the tests.
 
 namespace {
 
@@ -45,7 +45,7 @@ char to_char(unsigned byte) {
   return static_cast<char>(static_cast<unsigned char>(byte));
 }
 
-/// Runs of letters, digits, _ and -: what keys and names are made of.
+/// Returns all runs of letters, digits, _ and - with 3 to 31 characters: keys and names.
 std::set<std::string> words_in(const std::string& text) {
   std::set<std::string> words;
   std::string word;
@@ -60,7 +60,8 @@ std::set<std::string> words_in(const std::string& text) {
   return words;
 }
 
-/// What stands between quotation marks in our own sources: every key, whether a shipped file uses it or not.
+/// Returns the words in quotation marks in the sources of a directory: all keys, also those that no shipped
+/// file uses.
 std::set<std::string> quoted_words(const fs::path& directory) {
   std::set<std::string> words;
   for (const auto& entry : fs::directory_iterator(directory)) {
@@ -88,8 +89,8 @@ std::string without_comments(const std::string& text) {
   return out;
 }
 
-/// A scene's mesh is looked for beside the input.
-std::string mesh_beside(std::string text) {
+/// Removes the directories of mesh paths, because fuzz_config stores its mesh beside the input.
+std::string without_mesh_directory(std::string text) {
   for (std::size_t at; (at = text.find("../meshes/")) != std::string::npos;) text.erase(at, 10);
   return text;
 }
@@ -102,15 +103,16 @@ Seeds config_seeds() {
   };
   const auto add_all = [&](FileKind kind, const fs::path& directory) {
     for (const auto& entry : fs::directory_iterator(directory))
-      add(kind, mesh_beside(without_comments(text_of(entry.path()))));
+      add(kind, without_mesh_directory(without_comments(text_of(entry.path()))));
   };
   add(FileKind::settings, without_comments(text_of(kConfig / "wrenchd.toml")));
   add_all(FileKind::scene, kConfig / "scenes");
   add_all(FileKind::profile, kConfig / "profiles");
   add_all(FileKind::hand_script, kConfig / "hands");
-  const std::string kept = to_text(Calibration{"polhem", "A-0017", {{"joint_1", 0.0125}, {"joint_2", -1.5}}});
-  add(FileKind::calibration, kept);
-  add(FileKind::sealed_calibration, kept.substr(0, kept.rfind("# crc32")));
+  const std::string calibration =
+      to_text(Calibration{"polhem", "A-0017", {{"joint_1", 0.0125}, {"joint_2", -1.5}}});
+  add(FileKind::calibration, calibration);
+  add(FileKind::calibration_without_checksum, calibration.substr(0, calibration.rfind("# crc32")));
   seeds.words.merge(quoted_words(kConfig));
   for (const char* sign :
        {"[[", "]]", " = ", "= [", "{ ", " }", "\"\"\"", "'''", "nan", "inf", "1e308", "0x7f", "-1"})
@@ -118,7 +120,7 @@ Seeds config_seeds() {
   return seeds;
 }
 
-/// Ten reports a millisecond apart, each read and answered.
+/// For each profile: ten reports 1 ms apart; the host reads each and writes a command.
 Seeds report_seeds() {
   Seeds seeds;
   const auto profiles = known_profiles(SearchPath({kConfig})).profiles;
@@ -127,11 +129,10 @@ Seeds report_seeds() {
     std::string input(1, to_char(static_cast<unsigned>(p)));
     input += step(Step::read);
     for (unsigned i = 0; i < 10; ++i) {
-      input += step(Step::pass) + std::string(1, to_char(0x6f));
+      input += step(Step::advance) + std::string(1, to_char(0x6f));
       for (unsigned report = 0; report <= profiles[p].more_reports.size(); ++report) {
         input += step(Step::plausible) + std::string(1, to_char(report));
-        input +=
-            std::string(1, '\0') + to_char(100) + std::string(1, '\0');  // the next one, a millisecond on
+        input += std::string(1, '\0') + to_char(100) + std::string(1, '\0');  // sequence 1, time 1 ms later
         input += std::string(15 + 3 + kMaxJoints, to_char(i % 3)) + std::string(1, to_char(1));
       }
       input += step(Step::read);
@@ -159,7 +160,7 @@ Seeds mesh_seeds() {
   Seeds seeds;
   const PolygonSoup quads = box({0, 0, 0}, {2, 3, 4}), triangles = triangulated(quads);
   const std::array<std::vector<std::string>, 4> texts = {{
-      {as_off(quads), as_off(inside_out(quads)), as_off(both(quads, box({5, 0, 0}, {6, 1, 1})))},
+      {as_off(quads), as_off(inside_out(quads)), as_off(concatenated(quads, box({5, 0, 0}, {6, 1, 1})))},
       {as_obj(quads), as_obj(triangles)},
       {as_ascii_stl(triangles), as_binary_stl(triangles)},
       {as_ascii_ply(quads), as_binary_ply(triangles), as_binary_ply(quads, true)},
@@ -206,7 +207,7 @@ Seeds mesh_seeds() {
   return seeds;
 }
 
-/// A self-test that passes, an arming, a calm hand, and a while at full force.
+/// Passes the self-test, arms with a calm hand, and stays at full authority.
 Seeds event_seeds() {
   constexpr int kArmed = 60, kTicks = 400;
   std::string run;
@@ -220,7 +221,7 @@ Seeds event_seeds() {
   return seeds;
 }
 
-/// Requests that are done, and such as are refused for each reason; the first byte is a role.
+/// Valid requests, and requests that are rejected for each reason; the first byte selects the role.
 Seeds request_seeds() {
   Seeds seeds;
   const std::string head = R"({"jsonrpc":"2.0","id":1,"method":")",
@@ -266,7 +267,7 @@ Seeds seeds_of(const std::string& target) {
   if (target == "fuzz_report") return report_seeds();
   if (target == "fuzz_report_descriptor") return descriptor_seeds();
   if (target == "fuzz_mesh") return mesh_seeds();
-  return {};  // starts from nothing
+  return {};  // no initial corpus
 }
 
 void write(const Seeds& seeds, const fs::path& directory) {

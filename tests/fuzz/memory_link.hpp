@@ -9,13 +9,13 @@
 
 namespace wrenchd::test {
 
-/// A link to nobody: reports are put into it by hand, and what is written is looked at as it leaves.
+/// A link in memory: the test queues reports with arrive(), and take_command() receives the commands.
 class MemoryLink : public ReportLink {
  public:
-  LinkStatus reading = LinkStatus::ok;  ///< gone: the device is not there
-  LinkStatus writing = LinkStatus::ok;
+  LinkStatus reading = LinkStatus::ok;  ///< Status of reads; disconnected: the device is unplugged.
+  LinkStatus writing = LinkStatus::ok;  ///< Status of writes.
 
-  /// False where 64 reports wait already, or this one is too long for a queue.
+  /// Queues a report. Returns false if the queue is full or the report is too long.
   bool arrive(TimePoint now, std::span<const std::uint8_t> report) noexcept {
     return waiting_.push(now, report);
   }
@@ -26,8 +26,8 @@ class MemoryLink : public ReportLink {
   }
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
     if (reading != LinkStatus::ok) return {reading, 0, now};
-    const Packet* packet = waiting_.arrived(now);
-    if (packet == nullptr) return {LinkStatus::empty, 0, now};
+    const Packet* packet = waiting_.front_if_arrived(now);
+    if (packet == nullptr) return {LinkStatus::not_ready, 0, now};
     const auto bytes = packet->report().first(std::min(packet->length, buffer.size()));
     std::copy(bytes.begin(), bytes.end(), buffer.begin());
     const LinkRead read{LinkStatus::ok, packet->length, packet->arrives};

@@ -358,7 +358,7 @@ int main(int argc, char** argv) {
   try {
     const test::TemporaryDirectory files;
     const fs::path socket = files.path() / "control.sock", recording = files.path() / "run.h5";
-    // Anybody may observe, so that abusers without any role can use every method that reads.
+    // Every user may observe, so that abusers without any role can use every method that reads.
     const fs::path config = files.write("wrenchd.toml", "[control]\nobservers = \"*\"\n");
     fs::permissions(files.path(), fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
     Daemon daemon(
@@ -402,7 +402,7 @@ int main(int argc, char** argv) {
             slowest_answer_ms = std::max(
                 slowest_answer_ms,
                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - asked).count());
-          if (status["state"] == "stopped") violation("somebody stopped it who did not ask for it");
+          if (status["state"] == "stopped") violation("a client without a stop request stopped it");
         }
         slice.end_ns = now_ns();
         busy.end();

@@ -92,7 +92,7 @@ class FarSide final : private ReportSink {
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
       throw std::system_error(errno, std::generic_category(), "socketpair");
     socket_ = ends[0];
-    heard_ = 0;
+    received_ = 0;
     pushed_ = false;
     plugged_ = device_.now();
     return ends[1];
@@ -109,7 +109,7 @@ class FarSide final : private ReportSink {
     }
     std::array<std::uint8_t, kMaxReportBytes> bytes;
     for (ssize_t n; (n = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0;) {
-      ++heard_;
+      ++received_;
       if (!device_.take_command(device_.now(), std::span(bytes).first(static_cast<std::size_t>(n)))) continue;
       last_command_ = device_.now();
     }
@@ -125,7 +125,7 @@ class FarSide final : private ReportSink {
   TimePoint last_push() const { return last_push_; }
   /// Time with force above the threshold since count_above().
   Duration strong_for() const { return strong_for_; }
-  long heard() const { return heard_; }  ///< number of commands since plug(), valid or not
+  long received() const { return received_; }  ///< number of commands since plug(), valid or not
   /// Returns true if there was force since plug() that is not a remainder of the previous daemon's command.
   bool pushed() const { return pushed_; }
 
@@ -147,7 +147,7 @@ class FarSide final : private ReportSink {
   TimePoint last_command_{}, last_push_{};
   double strong_N_ = 0.0;
   Duration strong_for_{};
-  long heard_ = 0;
+  long received_ = 0;
   TimePoint plugged_{};
   bool pushed_ = false;
 };
@@ -192,7 +192,7 @@ class Daemon {
     over_ = true;
   }
   /// Checks the child without waiting.
-  void look() {
+  void poll_exit() {
     int status = 0;
     if (over_ || waitpid(pid_, &status, WNOHANG | WUNTRACED) != pid_) return;
     stopped_ = WIFSTOPPED(status);
@@ -294,7 +294,7 @@ class Proof {
       if (wall_now() >= end) return false;
       std::this_thread::sleep_for(kLook);
       device.live();
-      daemon.look();
+      daemon.poll_exit();
     }
     return true;
   }
@@ -326,12 +326,12 @@ class Proof {
   }
 
   void expect_silence(FarSide& device, TimePoint signalled) {
-    const long heard = device.heard();
+    const long received = device.received();
     for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.heard() != heard) violation("something speaks for the dead");
+    if (device.received() != received) violation("commands arrive from a killed daemon");
     if (device.push_N() != 0.0) violation("the motors push on");
     const Duration held = device.last_push() - device.last_command();
     if (held > bound_)
@@ -346,12 +346,12 @@ class Proof {
     if (!daemon.hold_servo_thread()) return violation("the servo thread cannot be held");
     device.live();
     const TimePoint held = device.now();
-    const long heard = device.heard();
+    const long received = device.received();
     for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.heard() == heard) violation("the writer thread sends no zero wrench for a hung loop");
+    if (device.received() == received) violation("the writer thread sends no zero wrench for a hung loop");
     if (device.push_N() != 0.0 || device.last_push() - held > bound_)
       violation("force for " + std::to_string(milliseconds(device.last_push() - held)) +
                 " ms after the loop was stuck");
@@ -377,7 +377,7 @@ class Proof {
   void restart(FarSide& device) {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       Daemon daemon = start(device, {});
-      const bool speaks = until(device, daemon, 20s, [&] { return daemon.over() || device.heard() > 0; });
+      const bool sends = until(device, daemon, 20s, [&] { return daemon.over() || device.received() > 0; });
       // The whole hand path: an armed daemon would see a calm hand within it and apply force.
       const TimePoint end = device.now() + from_seconds(kPath_s);
       until(device, daemon, 5s, [&] { return daemon.over() || device.now() > end; });
@@ -387,8 +387,8 @@ class Proof {
         count_fault();
         continue;
       }
-      if (!speaks || daemon.over())
-        return violation("the restarted daemon does not speak, or ends by itself");
+      if (!sends || daemon.over())
+        return violation("the restarted daemon sends no command, or ends without a signal");
       daemon.signal(SIGTERM);
       if (!until(device, daemon, 5s, [&] { return daemon.over(); }))
         return violation("the restarted daemon does not stop when asked");
@@ -418,7 +418,7 @@ class Proof {
   int signal_ = 0;
 };
 
-/// Requests a real-time priority, because a device does not wait for other programs. If the system refuses
+/// Requests a real-time priority, because a device does not wait for other programs. If the system rejects
 /// it, some attempts fail without an effect on the result.
 void ask_for_realtime() {
   const sched_param priority{48};  // above the daemon's priority of 45

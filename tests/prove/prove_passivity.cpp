@@ -215,7 +215,7 @@ class Host {
 
   /// Sets the stiffness that the bound allows for the measured loop. Returns the translational stiffness
   /// [N/m].
-  double settle() {
+  double derive_stiffness() {
     const LoopDelay loop{measured_.longest_period_s(), measured_.delay_s()};
     const SimulationSettings& s = circumstances_.hand;
     const DeviceDamping device{s.viscous_friction_N_s_per_m, s.viscous_friction_Nm_s_per_rad};
@@ -328,7 +328,7 @@ class Run {
     const auto measuring = static_cast<long>(kMeasuring_s / step_s_);
     const auto moving = static_cast<long>(seconds_ / step_s_);
     for (long i = 0; i < measuring; ++i) exchange(i);
-    stiffness_N_per_m_ = host_.settle();
+    stiffness_N_per_m_ = host_.derive_stiffness();
     settled_ = true;
     for (long i = 0; i < moving; ++i) {
       exchange(measuring + i);
@@ -367,12 +367,12 @@ class Run {
                    c_.phase_s;
   }
 
-  void move(double t_s, bool look) {
+  void move(double t_s, bool count_energy) {
     HandTarget goal = path_.at(from_seconds(t_s));
     if (!way_.holds(t_s)) goal = {handle_.X_BH(), handle_.V_BH()};
     handle_.step(goal, motors_);
     const bool off = motors_.force_N.isZero(0.0) && motors_.torque_Nm.isZero(0.0);
-    ledger_.add(handle_.energy(), look && off && free());
+    ledger_.add(handle_.energy(), count_energy && off && free());
   }
   /// Uses the true pose, not the encoder values.
   bool free() {

@@ -111,9 +111,9 @@ int main(int argc, char** argv) {
   const RunConfig plan = shipped_config();
   VirtualClock clock;
   HeldHandle handle(plan);
-  Runtime station(plan, handle, clock, ProxySearchMode::in_tick);
-  station.open();
-  ServoLoop& loop = station.loop();
+  Runtime runtime(plan, handle, clock, ProxySearchMode::in_tick);
+  runtime.open();
+  ServoLoop& loop = runtime.loop();
   TickRecord last;
   const Duration period = from_seconds(1.0 / plan.settings.servo.rate_Hz);
   Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,

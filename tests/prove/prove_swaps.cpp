@@ -147,8 +147,8 @@ int main(int argc, char** argv) {
   WallClock clock;
   SimulatedDevice simulated(plan.profile, plan.settings.simulation);
   LoopbackLink link(simulated, clock, plan.settings.simulation);
-  Runtime station(plan, link, clock);
-  station.open();
+  Runtime runtime(plan, link, clock);
+  runtime.open();
 
   std::map<std::uint32_t, std::uint64_t> sums;  // checksums of the published renderings, by id
   std::mutex sums_mutex;
@@ -157,7 +157,7 @@ int main(int argc, char** argv) {
   test::Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                                plan.settings.limits.force_slew_N_per_s,
                                plan.settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3});
-  const SharedState& state = station.enable_shared_state();
+  const SharedState& state = runtime.enable_shared_state();
   std::uint64_t missed = 0;
   std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
   std::atomic<std::uint64_t> pushed{0};
@@ -175,7 +175,7 @@ int main(int argc, char** argv) {
   std::thread servo([&] {
     for (const RealtimeGrant& grant : prepare_servo_thread(plan.settings.servo))
       std::printf("%s: %s\n", grant.granted ? "granted" : "denied", grant.request.c_str());
-    station.loop().run(clock, stop);
+    runtime.loop().run(clock, stop);
   });
   std::thread watcher([&] {
     bool first = true;
@@ -211,11 +211,11 @@ int main(int argc, char** argv) {
     }
   });
 
-  Asker asker(station.reconfigurator(), directory.path(), seed);
+  Asker asker(runtime.reconfigurator(), directory.path(), seed);
   int applied = 0, rejected = 0, done = 0;
   // Waits until the hand presses, before the first change.
   for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
-    if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
+    if (runtime.loop().telemetry().state() == State::disarmed) runtime.loop().requests().arm();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   constexpr int kInARow = 250;
@@ -225,16 +225,16 @@ int main(int argc, char** argv) {
     const TimePoint began = clock.now();
     for (int i = 0; i < kInARow && done < changes; ++i, ++done) {
       (asker.ask(done % 2 == 0) ? applied : rejected) += 1;
-      const auto [number, sum] = station.reconfigurator().current_rendering();
+      const auto [number, sum] = runtime.reconfigurator().current_rendering();
       {
         const std::lock_guard lock(sums_mutex);
         if (number > 0) sums[number] = sum;
       }
-      if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
-      if (is_latched(station.loop().telemetry().state())) station.loop().requests().acknowledge();
+      if (runtime.loop().telemetry().state() == State::disarmed) runtime.loop().requests().arm();
+      if (is_latched(runtime.loop().telemetry().state())) runtime.loop().requests().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().telemetry().crossfading())
+    while (runtime.loop().telemetry().crossfading())
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);

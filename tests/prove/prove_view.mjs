@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Does the view reach the servo loop? A daemon runs, wrenchctl view reads it, and a page is drawn in headless Chromium.
-// In turns both go on and stand still (SIGSTOP); the ticks of the two kinds of slices are held against each other.
+// The view alternately runs and is paused (SIGSTOP); the script compares the ticks of both kinds of slices.
 // Prints a line "view key value ...", and ends with 1 where p99.9 differs by more than --most-us.
 //
 //   node prove_view.mjs [--slices 10] [--slice-s 1] [--seed 1] [--most-us 50] [wrenchd's arguments, as --scene FILE]
@@ -97,5 +97,5 @@ test(async () => {
   const line = { ...times, difference_us: difference.toFixed(1), frames_per_s: (frames / seconds).toFixed(1), triangles, seed: options.seed };
   console.log("view " + Object.entries(line).flat().join(" "));
   if (frames === 0) throw new TooSlow("nothing was drawn: there was nothing to measure");
-  if (difference > options["most-us"]) throw new TooSlow(`p99.9 of a tick is ${difference.toFixed(1)} us longer while it is looked at`);
+  if (difference > options["most-us"]) throw new TooSlow(`p99.9 of a tick is ${difference.toFixed(1)} us longer while the view runs`);
 }, null);

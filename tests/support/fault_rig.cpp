@@ -212,11 +212,11 @@ const std::vector<Injection>& injections() {
     add({"the motors are off", Fault::motors_off, 26, wire(Kind::motors_off, 0.1), {}, [](State s, Phase) {
            return s == State::active;
          }});
-    add({"no room for commands", Fault::write_blocked, 4, wire(Kind::refuse_commands, 0.1), {}, not_testing});
+    add({"no room for commands", Fault::write_blocked, 4, wire(Kind::reject_commands, 0.1), {}, not_testing});
     add({"no room for commands, for long",
          Fault::write_failed,
          22,
-         wire(Kind::refuse_commands, 0.1),
+         wire(Kind::reject_commands, 0.1),
          {},
          not_testing});
     add({"a tick late", Fault::tick_late, 1,

@@ -63,17 +63,17 @@ double script_duration_s(const RunConfig& plan) {
 
 GalleryRun run_gallery_scene(const std::string& name, double seconds) {
   GalleryRun run{gallery_config(name), {}, {}};
-  VirtualRuntime station(run.config);
+  VirtualRuntime virtual_run(run.config);
   const double last_s =
       seconds > 0.0 ? std::min(seconds, script_duration_s(run.config)) : script_duration_s(run.config);
   const auto count = static_cast<std::size_t>(std::lround(last_s * run.config.settings.servo.rate_Hz)) + 1;
   TimePoint first{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == 1) station.runtime.loop().requests().arm();
-    station.tick();
-    if (i == 0) first = station.clock.now();
-    run.ticks.push_back(station.last);
-    run.scene_time_s.push_back(wrenchd::seconds(station.clock.now() - first));
+    if (i == 1) virtual_run.runtime.loop().requests().arm();
+    virtual_run.tick();
+    if (i == 0) first = virtual_run.clock.now();
+    run.ticks.push_back(virtual_run.last);
+    run.scene_time_s.push_back(wrenchd::seconds(virtual_run.clock.now() - first));
   }
   return run;
 }

@@ -63,9 +63,9 @@ std::optional<std::string> Invariants::check(const TickRecord& r) {
   if (F > last_F + limits_.force_slew_N_per_s * dt_s * (1.0 + 1e-9) ||
       T > last_T + limits_.torque_slew_Nm_per_s * dt_s * (1.0 + 1e-9))
     return violation_text(r, "I4 from ", last_F, " to ", F, " N, ", last_T, " to ", T, " N.m");
-  // The ramp ends in the first tick of `active`. A tick whose write was refused ends in another state.
+  // The ramp ends in the first tick of `active`. A tick whose write was rejected ends in another state.
   const bool rose =
-      state == kRamping || (before.state == kRamping && (state == kActive || r.write_fault != 0));
+      state == kRamping || (before.state == kRamping && (state == kActive || r.write_fault != Fault::none));
   if (r.authority > before.authority && !rose)
     return violation_text(r, "I6 authority from ", before.authority, " to ", r.authority);
   const bool latched = before.state == kFault || before.state == kStopped;

@@ -305,8 +305,8 @@ std::string LimitCases::describe() const {
        << " N.m, slew " << guarantees_.force_slew_N_per_s << " N/s " << guarantees_.torque_slew_Nm_per_s
        << " N.m/s, radius " << guarantees_.workspace_radius_m << " m, power " << guarantees_.max_power_W
        << " W\n";
-  text << "authority " << input_.authority << ", dt " << input_.dt_s << " s, causes "
-       << limit_causes_text(out_.causes) << "\n";
+  text << "authority " << input_.authority << ", dt " << input_.dt_s << " s, causes " << std::hex << "0x"
+       << out_.causes << std::dec << "\n";
   show("centre", guarantees_.workspace_centre_m);
   show("place", input_.p_BH_m);
   show("linear", input_.V_BH.linear_m_per_s);

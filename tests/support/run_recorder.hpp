@@ -12,8 +12,8 @@ namespace wrenchd::test {
 /// Records a runtime whose ticks the test runs. Must be created before the first tick.
 class RunRecorder {
  public:
-  RunRecorder(Runtime& station, const std::filesystem::path& file)
-      : state_(station.enable_shared_state()), writer_(file, station.recording_header()) {}
+  RunRecorder(Runtime& runtime, const std::filesystem::path& file)
+      : state_(runtime.enable_shared_state()), writer_(file, runtime.recording_header()) {}
   ~RunRecorder() {
     append_new_ticks();
     writer_.append(batch_);

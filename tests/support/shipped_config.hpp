@@ -57,7 +57,7 @@ struct VirtualRuntime : SimulatedRuntime<VirtualClock> {
   double force_N() const { return Vector3d(last.F_out[0], last.F_out[1], last.F_out[2]).norm(); }
   double torque_Nm() const { return Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm(); }
   State state() const { return static_cast<State>(last.state); }
-  Fault cause() const { return static_cast<Fault>(last.state_cause); }
+  Fault cause() const { return last.state_cause; }
   void inject(SimulatedFault::Kind kind, double start_s, double duration_s) {
     simulated.inject({kind, from_seconds(start_s), from_seconds(duration_s)});
   }

@@ -42,14 +42,14 @@ const std::vector<DeviceProfile>& shipped() {
   return profiles;
 }
 
-/// The profile that wrenchd would give the device. Throws where it has none.
+/// Returns the profile that wrenchd selects for the device. Throws if there is none.
 const DeviceProfile& profile_of(const UsbDevice& device) {
   const MatchResult match = match_profile(inspect_device(device).identity, shipped());
   if (!match.profile) throw std::runtime_error("no profile matches " + describe(device));
   return shipped()[*match.profile];
 }
 
-/// A device opened over a link, and a host that reads and writes.
+/// An open link to a device, and a host that reads and writes.
 struct Driven {
   std::unique_ptr<ReportLink> link;
   ProfileDevice device;
@@ -62,7 +62,7 @@ struct Driven {
     ticks(20);
   }
 
-  /// By the device's reports, or where none comes, every 1.5 ms.
+  /// Runs one tick per report of the device; without reports every 1.5 ms.
   void ticks(int n, const Wrench& F = {}, bool motors_on = false) {
     set_own_priority(kPriority);
     for (int i = 0; i < n; ++i) {
@@ -75,7 +75,7 @@ struct Driven {
   }
 };
 
-/// An emulated HID device plugged in, found, matched, opened and heard.
+/// An emulated HID device that is connected, found, matched and opened, with its first report read.
 struct Plugged {
   UsbipEmulator far;
   UsbDevice listed;
@@ -86,7 +86,7 @@ struct Plugged {
         listed((far.plug(kPort), await_listed(identity))),
         host(profile_of(listed), make_link(backend, listed, kPriority)) {}
 
-  /// What the profile and the device's own descriptor disagree about.
+  /// Returns the differences between the profile and the device's descriptor.
   std::size_t disagreements() const {
     const InspectedDevice facts = inspect_device(listed);
     return facts.descriptor
@@ -99,7 +99,7 @@ struct Plugged {
 
 using Counts = std::array<int, 6>;
 
-/// Encoders of a hand that wanders about, slowly enough for one.
+/// Encoder counts of a slow random motion of a hand.
 Counts wandering(int i) {
   const auto wave = [i](double amplitude, double period) {
     return static_cast<int>(std::lround(amplitude * std::sin(6.283185307179586 * i / period)));
@@ -109,10 +109,9 @@ Counts wandering(int i) {
 }
 
 void polhem(Backend backend) {
-  Row row(
-      backend, "Polhem emulator",
-      "found by its profile; 400 places of the encoders come out by the maker's formulas to 1e-6, 100 "
-      "forces arrive as the maker's currents; amplifiers off 0.5 s after the last report, zeros at release");
+  Row row(backend, "Polhem emulator",
+          "found by its profile; 400 encoder positions agree with the manufacturer's formulas to 1e-6, 100 "
+          "forces with its currents; amplifiers off 0.5 s after the last report, zeros at release");
   EmulatedPolhem board(64);
   board.set_encoder_counts(wandering(0));
   UsbShape shape;
@@ -169,7 +168,7 @@ void polhem(Backend backend) {
 
 // --- SpaceMouse -------------------------------------------------------------------------------------------
 
-/// Share of the speed for a share of the cap's way, as its profiles have it.
+/// Fraction of the maximum speed for a fraction of the puck's deflection, as in its profiles.
 double firmness(double share) {
   return std::pow((share - 0.08) / 0.92, 2.0);
 }
@@ -178,8 +177,8 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   const bool split = format_of == EmulatedSpaceMouse::Format::split;
   Row row(
       backend, format("SpaceMouse emulator, %s", split ? "split" : "combined"),
-      "found by its profile; silent at rest without a fault; pushed for 0.5 s the tool's way is velocity "
-      "times time to 1e-6; let go it stops; a button brings it back to where it began; the LED goes off at "
+      "found by its profile; silent at rest without a fault; deflected for 0.5 s the tool moves by velocity "
+      "times time to 1e-6; released it stops; a button returns it to its start; the LED goes off at "
       "release, by SET_REPORT");
   EmulatedSpaceMouse mouse(format_of);
   UsbShape shape;
@@ -236,8 +235,8 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
 
 // --- Falcon -----------------------------------------------------------------------------------------------
 
-/// Where the equation of the maker's geometry puts a leg's shin, from where it should end: 0 at the right
-/// place. Letters are those of devices/kinematics.hpp.
+/// Returns the residual of a leg's constraint in the manufacturer's geometry: 0 at the correct position.
+/// Letters as in devices/kinematics.hpp.
 double leg_error_m(const Vector3d& p_B, const std::array<int, 3>& counts, int leg) {
   constexpr double kTurn = 6.283185307179586;
   const Vector3d p(-p_B.y(), p_B.z(), 0.1346 - p_B.x());  // the device's own axes
@@ -252,8 +251,9 @@ double leg_error_m(const Vector3d& p_B, const std::array<int, 3>& counts, int le
 void falcon() {
   Row row(
       Backend::libusb, "Falcon emulator",
-      "found by its profile; handshake and firmware through its serial chip; homed; 200 places come out by "
-      "the legs' equation to 1e-6, forces arrive as efforts; opened again it is not loaded again");
+      "found by its profile; handshake and firmware through its serial chip; homed; 200 positions satisfy "
+      "the legs' constraint to 1e-6, forces arrive as efforts; on reopening the firmware is not loaded "
+      "again");
   EmulatedFalcon falcon;
   falcon.corrupt_firmware_echoes(1);
   UsbShape shape;
@@ -267,13 +267,13 @@ void falcon() {
   const UsbDevice listed = await_listed(identity, false);
   DeviceProfile profile = profile_of(listed);
   CHECK_THAT(row, profile.name == "falcon");
-  std::string refusal;
+  std::string rejection;
   try {
     make_link(Backend::libusb, listed, kPriority, link_settings(profile))->open();
   } catch (const std::runtime_error& e) {
-    refusal = e.what();
+    rejection = e.what();
   }
-  CHECK_THAT(row, refusal.find("it runs no firmware, and none is named") != std::string::npos);
+  CHECK_THAT(row, rejection.find("it runs no firmware, and none is named") != std::string::npos);
 
   profile.endpoints.firmware = "/tmp/firmware";
   std::vector<std::uint8_t> firmware(1000);

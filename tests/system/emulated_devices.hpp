@@ -5,8 +5,8 @@
 
 namespace wrenchd::test {
 
-/// The rows of the kernel test in which emulators of real devices are plugged in, found by their shipped
-/// profiles, and driven over one of the backends.
+/// Rows of the kernel test with emulated devices: each is connected, found by its shipped profile, and driven
+/// over one of the backends.
 void emulated_devices(Backend backend);
 
 }  // namespace wrenchd::test

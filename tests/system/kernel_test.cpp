@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The transports against a real kernel. Runs inside the machine that tests/system/run starts, whose clock
-// counts instructions: every time printed here is exact, and the same in each run.
+// Tests the transports with a real kernel. Runs in the virtual machine of tests/system/run, whose clock
+// counts instructions: every printed time is exact and equal in each run.
 //
-// For each backend, in the order of main(): what is done to the device, and the state it must end in. The
-// sentence in each row is the specification; the checks below it say the same in code.
+// Each row has an action on the device and the required result, for each backend, in the order of main(). The
+// text of a row is its specification; the checks below implement it.
 
 #include <algorithm>
 #include <array>
@@ -43,22 +43,23 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-/// Of the servo thread, the link's thread, the device and the controller: each runs until it sleeps. Were one
-/// above another, on one processor it would run into a lock that the one who woke it still holds, and back.
+/// Priority of the servo thread, the link's thread, the device and the controller: each runs until it sleeps.
+/// With different priorities on one processor a woken thread would block on a lock that its waker still
+/// holds.
 constexpr int kPriority = 60;
 constexpr int kPort = 0;
 
-// --- plugging ---------------------------------------------------------------------------------------------
+// --- hot plug ---------------------------------------------------------------------------------------------
 
-/// What the monitor told, to be waited for.
-class Told {
+/// Events of the hot-plug monitor; the test waits for them.
+class HotplugEvents {
  public:
-  void hear(const HotplugEvent& event) {
+  void record(const HotplugEvent& event) {
     const std::lock_guard lock(mutex_);
     events_.push_back(event);
     changed_.notify_all();
   }
-  void forget() {
+  void clear() {
     const std::lock_guard lock(mutex_);
     events_.clear();
   }
@@ -79,32 +80,32 @@ class Told {
 
 // --- the servo loop ---------------------------------------------------------------------------------------
 
-/// What a run of ticks saw.
+/// Observations of a run of ticks.
 struct Seen {
   int ticks = 0;
   int fresh = 0;
   std::uint64_t missing = 0, skipped = 0, rejected = 0;
   int wrong_poses = 0;
   Fault fault = Fault::none;  ///< the first one
-  Duration fault_after{};     ///< since the run began
-  Duration fault_silence{};   ///< when it came: since the last fresh sample
-  Duration longest_gap{};     ///< between two fresh samples, or since the run began
+  Duration fault_after{};     ///< time of the fault since the start of the run
+  Duration fault_silence{};   ///< time of the fault since the last fresh sample
+  Duration longest_gap{};     ///< longest time between two fresh samples, or since the start of the run
   std::uint64_t allocations = 0, locks = 0;
-  std::vector<Duration> work;  ///< of each tick, from waking up to the command handed over
+  std::vector<Duration> work;  ///< time of each tick from wake-up to the submitted command
 };
 
-/// As small as a servo loop can be: by the device's reports, a command for each, and the hand released at
-/// every fault. Armed again only when asked.
+/// A minimal servo loop: one tick and one command per report; it releases the hand at every fault and arms
+/// again only on request.
 class Servo {
  public:
   Servo(Device& device, double rate_Hz) : device_(device), period_(from_seconds(1.0 / rate_Hz)) {
-    work_.reserve(65536);  // nothing is allocated in a run
+    work_.reserve(65536);  // a run does not allocate
   }
 
   void arm() { armed_ = true; }
   bool armed() const { return armed_; }
 
-  /// Counted from the moment `begin` is called, when the loop has run for a few ticks.
+  /// The observations start when `begin` is called, after a few ticks.
   Seen run_ticks(int n, const std::function<void()>& begin) {
     constexpr int kLeadIn = 16;
     return run(n, TimePoint::max(), kLeadIn, begin);
@@ -194,10 +195,10 @@ std::string summary(const Seen& seen) {
                     wrenchd::fault_row(seen.fault).name.data(), ms(seen.fault_after), ms(seen.fault_silence));
 }
 
-/// A device plugged in, found, opened over one of the backends, and heard.
+/// A device that is connected, found and opened over one of the backends, with its first report read.
 struct Session {
   UsbipDevice::Identity identity;
-  UsbipDevice far;  ///< the device itself
+  UsbipDevice far;  ///< the device at the other end
   UsbDevice listed;
   std::unique_ptr<ReportLink> link;
   ProfileDevice device;
@@ -213,12 +214,12 @@ struct Session {
     servo.run_for(20ms);
   }
 
-  /// Armed, and the motors are on.
+  /// Arms, and waits until the motors are on.
   void arm() {
     servo.arm();
     servo.run_for(20ms);
   }
-  /// The link closed, timed.
+  /// Closes the link and returns the duration.
   Duration close() {
     const TimePoint began = SteadyClock::now();
     device.close();
@@ -226,20 +227,19 @@ struct Session {
   }
 };
 
-// --- what is specified ------------------------------------------------------------------------------------
+// --- specification ------------------------------------------------------------------------------------
 
 struct Budget {
   Backend backend;
   double rate_Hz;
   int ticks;
-  Duration turn_around_p50, turn_around_p999;  ///< pose on the wire to command on the wire
-  Duration work_p50, work_p999;                ///< read to write, on the servo thread
+  Duration turn_around_p50, turn_around_p999;  ///< time from a transmitted pose to its received command
+  Duration work_p50, work_p999;                ///< time from read to write on the servo thread
 };
 
-// Measured (kernel 6.1.192 rt, gcc 12.2), and a tenth more. 1 ns is one instruction of the machine, the
-// kernel's included. At 8 kHz there are 125 us for everything: device, controller, kernel, servo; and how
-// many ticks the timer's interrupt falls into, some 3 us, is a matter of the phase that a build happens to
-// have.
+// Measured values (kernel 6.1.192 rt, gcc 12.2) plus 10 %. 1 ns is one instruction, including the kernel's.
+// At 8 kHz device, controller, kernel and servo share 125 us per tick. The number of ticks with a timer
+// interrupt of about 3 us depends on the phase, which differs between builds.
 constexpr std::array kBudgets{
     Budget{Backend::hidraw, 1000.0, 10'000, 114us, 114us, 12us, 12us},
     Budget{Backend::hidraw, 8000.0, 40'000, 118us, 124us, 12us, 15us},
@@ -255,7 +255,7 @@ T quantile(std::vector<T> values, double q) {
 
 void steady(const Budget& budget) {
   Row row(budget.backend, format("%d ticks at %.0f Hz", budget.ticks, budget.rate_Hz),
-          "every sample once, every command taken, nothing allocated or locked, within the budget");
+          "every sample read once, every command accepted, no allocation, no lock, within the budget");
   Session s(budget.backend, budget.rate_Hz);
   s.arm();
   DeviceRecord before;
@@ -269,8 +269,8 @@ void steady(const Budget& budget) {
   const Duration p50 = quantile(turn_around, 0.5), p999 = quantile(turn_around, 0.999);
   const Duration work50 = quantile(seen.work, 0.5), work999 = quantile(seen.work, 0.999);
   row.saw(summary(seen));
-  row.saw(format("%" PRIu64 " commands taken, %" PRIu64 " refused", after.commands - before.commands,
-                 after.refused - before.refused));
+  row.saw(format("%" PRIu64 " commands accepted, %" PRIu64 " rejected", after.commands - before.commands,
+                 after.rejected - before.rejected));
   row.saw(format("pose to command on the wire p50 %.3f p99.9 %.3f max %.3f us", us(p50), us(p999),
                  us(quantile(turn_around, 1.0))));
   row.saw(format("read to write p50 %.3f p99.9 %.3f max %.3f us", us(work50), us(work999),
@@ -283,32 +283,32 @@ void steady(const Budget& budget) {
   CHECK_THAT(row, seen.allocations == 0 && seen.locks == 0);
   CHECK_THAT(row, after.unprepared == before.unprepared);
   CHECK_THAT(row, after.late_ticks == before.late_ticks);
-  CHECK_THAT(row, after.refused == 0);
+  CHECK_THAT(row, after.rejected == 0);
   CHECK_THAT(row, after.motors_on && !after.watchdog_tripped);
-  // The first or the last may be on its way as the ticks begin and end.
+  // The first or the last may be in transit at the start and the end.
   const auto commands = static_cast<std::int64_t>(after.commands - before.commands);
   CHECK_THAT(row, std::abs(commands - budget.ticks) <= 1);
   CHECK_THAT(row, p50 <= budget.turn_around_p50 && p999 <= budget.turn_around_p999);
   CHECK_THAT(row, work50 <= budget.work_p50 && work999 <= budget.work_p999);
 }
 
-/// Reports that are not ones, or none at all, for 100 ms: the hand is released 20 ms after the last good one.
+/// Invalid reports, or none, for 100 ms: the hand is released 20 ms after the last valid one.
 void bad_reports(Backend backend, Trouble trouble, const char* what, bool rejects) {
   Row row(backend, format("%s, 100 ms", what),
-          "sample_stale after 20 ms, motors off; heard again after it, disarmed");
+          "sample_stale after 20 ms, motors off; read again afterwards, disarmed");
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(trouble);
   const Seen during = s.servo.run_for(100ms);
   const DeviceRecord stopped = s.far.record();
   s.far.set(Trouble::none);
-  s.servo.run_for(5ms);  // the sample that ends the silence still tells of it
+  s.servo.run_for(5ms);  // the first sample after the silence still has its fault
   const Seen after = s.servo.run_for(50ms);
   row.saw(summary(during));
   row.saw("then " + summary(after));
   CHECK_THAT(row, during.fault == Fault::sample_stale);
   CHECK_THAT(row, during.fault_silence > 19ms && during.fault_silence < 23ms);
-  // Newer kernels do not pass short HID reports on at all.
+  // Newer kernels drop short HID reports.
   const bool kernel_drops = trouble == Trouble::short_reports && backend == Backend::hidraw;
   CHECK_THAT(row, (rejects && during.rejected >= 95) || ((!rejects || kernel_drops) && during.rejected == 0));
   CHECK_THAT(row, during.fresh <= 1);
@@ -318,7 +318,7 @@ void bad_reports(Backend backend, Trouble trouble, const char* what, bool reject
 }
 
 void duplicates(Backend backend) {
-  Row row(backend, "each report twice, 100 ms", "the second is rejected; none is lost, the hand is held on");
+  Row row(backend, "each report twice, 100 ms", "the second is rejected; none is lost, the force continues");
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::duplicates);
@@ -332,7 +332,7 @@ void duplicates(Backend backend) {
 }
 
 void late(Backend backend) {
-  Row row(backend, "a report 10 ms late", "its number tells what is missing; the hand is held on");
+  Row row(backend, "a report 10 ms late", "its number shows the missing reports; the force continues");
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::silent);
@@ -348,7 +348,7 @@ void late(Backend backend) {
 
 void stalled_once(Backend backend) {
   Row row(backend, "IN endpoint stalls",
-          "the halt is cleared, reports come again before 20 ms, the hand is held on");
+          "the halt is cleared, reports come again before 20 ms, the force continues");
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::stalled_once);
@@ -362,7 +362,7 @@ void stalled_once(Backend backend) {
 
 void stalled(Backend backend) {
   Row row(backend, "IN endpoint stalls, 100 ms",
-          "sample_stale after 20 ms, motors off; heard again after it, disarmed");
+          "sample_stale after 20 ms, motors off; read again afterwards, disarmed");
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::stalled);
@@ -382,14 +382,14 @@ void stalled(Backend backend) {
   CHECK_THAT(row, !s.servo.armed() && !s.far.record().motors_on);
 }
 
-void deaf(Backend backend) {
+void blocked_output(Backend backend) {
   Row row(backend, "OUT endpoint NAKs, 100 ms",
-          "write_failed after 4 ms, no sample lost, the device's own watchdog frees the hand; zeros go out "
-          "first after it");
+          "write_failed after 4 ms, no sample lost, the device's watchdog releases the hand; zeros are sent "
+          "first afterwards");
   Session s(backend, 1000.0);
   s.arm();
   const DeviceRecord before = s.far.record();
-  s.far.set(Trouble::deaf);
+  s.far.set(Trouble::blocked);
   const Seen during = s.servo.run_for(100ms);
   const DeviceRecord stopped = s.far.record();
   s.far.set(Trouble::none);
@@ -407,18 +407,18 @@ void deaf(Backend backend) {
   CHECK_THAT(row, s.servo.armed() && s.far.record().motors_on);
 }
 
-/// What a close may take while the kernel keeps a write: usbhid gives up after 5 s (USB_CTRL_SET_TIMEOUT),
-/// and closing a hidraw node waits for that; libusb's transfers are taken back.
+/// Limit for close() while a write is pending in the kernel: usbhid ends it after 5 s (USB_CTRL_SET_TIMEOUT),
+/// and closing a hidraw node waits for that; libusb cancels its transfers.
 void deaf_for_ever(Backend backend) {
   const Duration bound = backend == Backend::hidraw ? Duration(6s) : Duration(600ms);
   Row row(backend, "closed while OUT NAKs",
           format("closed within %.1f s; %s", ms(bound) / 1e3,
                  backend == Backend::hidraw
-                     ? "what the device hears last is zeros"
+                     ? "the last command is zero"
                      : "nothing more is sent, the device's own watchdog has freed the hand"));
   Session s(backend, 1000.0);
   s.arm();
-  s.far.set(Trouble::deaf);
+  s.far.set(Trouble::blocked);
   s.servo.run_for(20ms);
   const DeviceRecord silenced = s.far.record();
   const Duration took = s.close();
@@ -433,7 +433,7 @@ void deaf_for_ever(Backend backend) {
 }
 
 void closed(Backend backend) {
-  Row row(backend, "closed while armed", "the last thing the device hears is zeros with the motors off");
+  Row row(backend, "closed while armed", "the last command is zero with the motors off");
   Session s(backend, 1000.0);
   s.arm();
   const bool was_on = s.far.record().motors_on;
@@ -444,25 +444,27 @@ void closed(Backend backend) {
   CHECK_THAT(row, was_on);
   CHECK_THAT(row, !end.motors_on && !end.watchdog_tripped && !end.last.enable);
   CHECK_THAT(row, end.last.F.force_N == Vector3d::Zero() && end.last.F.torque_Nm == Vector3d::Zero());
-  const UsbDevice again = await_listed(s.identity);  // with its hidraw node: the kernel has it back
+  const UsbDevice again =
+      await_listed(s.identity);  // with its hidraw node: the kernel driver is attached again
   CHECK_THAT(row, again.is_same_device(s.listed));
 }
 
-void unplugged(Backend backend, Told& told) {
-  Row row(backend, "unplugged, then plugged in",
-          "device_lost within two ticks, told by the monitor; found again, disarmed, motors off until armed");
+void unplugged(Backend backend, HotplugEvents& events) {
+  Row row(
+      backend, "unplugged, then plugged in",
+      "device_lost within two ticks, reported by the monitor; found again, disarmed, motors off until armed");
   Session s(backend, 1000.0);
   s.arm();
-  told.forget();
+  events.clear();
   std::thread hand([&] {
     std::this_thread::sleep_for(10500us);
     s.far.unplug();
   });
   const Seen seen = s.servo.run_for(1s);
   hand.join();
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
-  if (backend == Backend::hidraw)  // libusb has taken the node away when it opened the device
-    CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "hidraw", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
+  if (backend == Backend::hidraw)  // libusb detached the kernel driver, so the node is gone
+    CHECK_THAT(row, events.await(HotplugEvent::Kind::disconnected, "hidraw", s.listed.port_path));
   const Duration took = s.close();
   row.saw(summary(seen));
   row.saw(format("closed in %.3f ms", ms(took)));
@@ -471,10 +473,10 @@ void unplugged(Backend backend, Told& told) {
   CHECK_THAT(row, took < 600ms);
 
   UsbipDevice back(s.identity, 1000.0, kPriority);
-  told.forget();
+  events.clear();
   back.plug(kPort);
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "usb", s.listed.port_path));
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "hidraw", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::connected, "usb", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::connected, "hidraw", s.listed.port_path));
   const UsbDevice found = await_listed(s.identity);
   CHECK_THAT(row, found.is_same_device(s.listed) && found.port_path == s.listed.port_path);
   CHECK_THAT(row, back.record().out_reports == 0);
@@ -498,7 +500,7 @@ void unplugged_in_a_write(Backend backend) {
   Row row(backend, "unplugged while OUT NAKs", "device_lost, closed within 0.6 s");
   Session s(backend, 1000.0);
   s.arm();
-  s.far.set(Trouble::deaf);
+  s.far.set(Trouble::blocked);
   s.servo.run_for(20ms);
   s.far.unplug();
   const Seen seen = s.servo.run_for(1s);
@@ -509,10 +511,9 @@ void unplugged_in_a_write(Backend backend) {
   CHECK_THAT(row, took < 600ms);
 }
 
-/// The link that knew the device is opened again and finds another in its place.
+/// The link of the first device is opened again while another device is in its port.
 void another_device(Backend backend, const char* what, const UsbipDevice::Identity& other) {
-  Row row(backend, format("%s back in the same port", what),
-          "refused by name, and not one byte is written to it");
+  Row row(backend, format("%s back in the same port", what), "rejected by name, without any write");
   Session s(backend, 1000.0);
   s.arm();
   s.far.unplug();
@@ -521,24 +522,24 @@ void another_device(Backend backend, const char* what, const UsbipDevice::Identi
   UsbipDevice stranger(other, 1000.0, kPriority);
   stranger.plug(kPort);
   const UsbDevice found = await_listed(other);
-  std::string refusal;
+  std::string rejection;
   try {
     s.device.open();
   } catch (const std::runtime_error& e) {
-    refusal = e.what();
+    rejection = e.what();
   }
   s.servo.arm();
   const Seen seen = s.servo.run_for(20ms);
   std::this_thread::sleep_for(20ms);
-  row.saw(refusal.empty() ? "opened" : refusal);
+  row.saw(rejection.empty() ? "opened" : rejection);
   CHECK_THAT(row, found.port_path == s.listed.port_path);
-  CHECK_THAT(row, refusal.find("nothing was written") != std::string::npos);
+  CHECK_THAT(row, rejection.find("nothing was written") != std::string::npos);
   CHECK_THAT(row, seen.fault == Fault::device_lost);
   CHECK_THAT(row, stranger.record().out_reports == 0);
   CHECK_THAT(row, stranger.record().made > 0);
 }
 
-void all_of(Backend backend, Told& told) {
+void all_of(Backend backend, HotplugEvents& events) {
   for (const Budget& budget : kBudgets)
     if (budget.backend == backend) steady(budget);
   bad_reports(backend, Trouble::short_reports, "short reports", true);
@@ -549,10 +550,10 @@ void all_of(Backend backend, Told& told) {
   late(backend);
   stalled_once(backend);
   stalled(backend);
-  deaf(backend);
+  blocked_output(backend);
   closed(backend);
   deaf_for_ever(backend);
-  unplugged(backend, told);
+  unplugged(backend, events);
   unplugged_in_a_write(backend);
   another_device(backend, "another product", {0x1209, 0x0001, "A1"});
   another_device(backend, "an equal one", {0x1209, 0x6d0f, "B2"});
@@ -564,9 +565,9 @@ int main() {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   mlockall(MCL_CURRENT | MCL_FUTURE);
   try {
-    Told told;
-    const HotplugMonitor monitor([&told](const HotplugEvent& event) { told.hear(event); });
-    for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, told);
+    HotplugEvents events;
+    const HotplugMonitor monitor([&events](const HotplugEvent& event) { events.record(event); });
+    for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, events);
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) emulated_devices(backend);
   } catch (const std::exception& e) {
     std::printf("kernel test: %s\n", e.what());

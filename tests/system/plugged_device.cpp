@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// A device of the reference layout in a simulated hand, plugged into this machine's virtual controller
-// (vhci_hcd) for as long as this program runs. Usage: plugged_device; SIGTERM unplugs it.
+// Connects a device of the reference layout in a simulated hand to this machine's virtual controller
+// (vhci_hcd) while this program runs. Usage: plugged_device; SIGTERM disconnects it.
 
 #include <csignal>
 #include <cstdio>
@@ -17,11 +17,11 @@ namespace {
 using namespace wrenchd;
 using namespace wrenchd::test;
 
-/// Above the daemon's: the device has a processor of its own where it is a real one.
+/// Above the priority of the daemon, because a real device has a processor of its own.
 constexpr int kPriority = 60;
 constexpr int kPort = 0;
 
-/// A calm hand: it holds the handle over the table of the default scene, and lowers it a little and slowly.
+/// A calm hand: it holds the handle over the table of the default scene and lowers it slowly.
 SimulationSettings calm_hand() {
   SimulationSettings settings;
   const auto at = [](double time_s, double z_m) {

@@ -25,8 +25,7 @@ inline double ms(Duration d) {
   return static_cast<double>(d.count()) / 1e6;
 }
 
-/// One line of the kernel test's table: what is done, what must come of it, what was seen, and whether that
-/// is the same. It is printed where the row ends.
+/// One row of the kernel test: action, required result, observation and verdict. The destructor prints it.
 class Row {
  public:
   Row(Backend backend, std::string done, std::string specified);
@@ -38,7 +37,7 @@ class Row {
   void check(bool holds, const char* what) {
     if (!holds) failures_.emplace_back(what);
   }
-  /// Of all rows so far; prints how many.
+  /// Prints the number of rows. Returns true if all of them passed.
   static bool all_as_specified();
 
  private:
@@ -49,14 +48,14 @@ class Row {
 
 #define CHECK_THAT(row, condition) (row).check(condition, #condition)
 
-/// The device in the list of what is plugged in, with the nodes that are there for it, once it may be opened.
-/// Throws where it does not come. `hid`: it has a hidraw node.
+/// Waits until the device is listed with its nodes and can be opened, and returns it. Throws if it does not
+/// appear. `hid`: it has a hidraw node.
 UsbDevice await_listed(const UsbIdentity& identity, bool hid = true);
 
 std::unique_ptr<ReportLink> make_link(Backend backend, const UsbDevice& device, int priority,
                                       LinkSettings settings = {});
 
-/// SCHED_FIFO of this thread; 0: an ordinary one.
+/// Sets the SCHED_FIFO priority of this thread; 0: ordinary scheduling.
 void set_own_priority(int priority);
 
 }  // namespace wrenchd::test

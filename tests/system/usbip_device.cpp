@@ -24,12 +24,12 @@ SimulationSettings ideal() {
   return settings;
 }
 
-/// Counts of the force in x that name a pose.
+/// Returns the number of the pose that the force in x encodes.
 constexpr double kAnswerStep_N = 1e-6;
 
 }  // namespace
 
-/// To and fro: 1 um with each report, so the handle is never too fast, whatever the rate.
+/// A periodic motion of 1 um per report, so that the speed is valid at any rate.
 double UsbipDevice::position_m(std::uint64_t sequence) noexcept {
   const std::uint64_t phase = sequence & 0xFFFFU;
   return 1e-6 * static_cast<double>(phase < 0x8000U ? phase : 0x10000U - phase);
@@ -58,7 +58,7 @@ void UsbipDevice::set(Trouble trouble) {
   const std::lock_guard lock(mutex_);
   trouble_ = trouble;
   halted_ = trouble == Trouble::stalled_once || trouble == Trouble::stalled;
-  if (trouble != Trouble::deaf) take_held_commands();
+  if (trouble != Trouble::blocked) take_held_commands();
   flush();
 }
 
@@ -75,7 +75,7 @@ std::vector<Duration> UsbipDevice::turn_arounds() const {
   return turn_arounds_;
 }
 
-// --- what the host does -----------------------------------------------------------------------------------
+// --- host -----------------------------------------------------------------------------------
 
 TimePoint UsbipDevice::begin(TimePoint now) {
   powered_ = now;
@@ -89,7 +89,7 @@ TimePoint UsbipDevice::on_time(TimePoint now) {
 }
 
 void UsbipDevice::on_out(Transfer transfer) {
-  if (trouble_ == Trouble::deaf) {
+  if (trouble_ == Trouble::blocked) {
     held_out_.push_back(std::move(transfer));
     return;
   }
@@ -102,7 +102,7 @@ void UsbipDevice::on_clear_halt() {
   ++record_.halts_cleared;
 }
 
-// --- the firmware -----------------------------------------------------------------------------------------
+// --- firmware -----------------------------------------------------------------------------------------
 
 void UsbipDevice::tick(std::uint64_t ticks, TimePoint now) {
   record_.late_ticks += ticks - 1;
@@ -128,7 +128,7 @@ void UsbipDevice::tick(std::uint64_t ticks, TimePoint now) {
   flush();
 }
 
-/// Answers transfers with reports, as long as there are both. A halted endpoint answers with a stall.
+/// Answers pending transfers with queued reports. A halted endpoint answers with a stall.
 void UsbipDevice::flush() {
   while (halted_ && !in_.empty()) {
     reply(in_.front().number, -EPIPE, 0, {});
@@ -151,7 +151,7 @@ void UsbipDevice::take_command(std::span<const std::uint8_t> data) {
   const auto [outcome, report] = decode(profile_.wrench_report, data);
   if (outcome == Decoding::ok) record_.last = report;
   if (!firmware_.take_command(now, data)) {
-    ++record_.refused;
+    ++record_.rejected;
     return;
   }
   ++record_.commands;

@@ -15,40 +15,40 @@
 
 namespace wrenchd::test {
 
-/// What a device does wrong from now on.
+/// Simulated defect of the device from now on.
 enum class Trouble : std::uint8_t {
   none,
   short_reports,  ///< the first half of each report
   garbled,        ///< one wrong bit in each report
   duplicates,     ///< each report twice
-  frozen,         ///< one report again and again, sequence and all
-  silent,         ///< no reports; poses are taken all the same, so that their numbers go on
+  frozen,         ///< repeats one report with its sequence number
+  silent,         ///< no reports; sequence numbers continue
   stalled_once,   ///< the IN endpoint halts until the host clears it; then it works again
-  stalled,        ///< it halts, and clearing does not help
-  deaf,           ///< NAKs its OUT endpoint: a command is neither taken nor refused
+  stalled,        ///< it halts, and clearing has no effect
+  blocked,        ///< NAKs its OUT endpoint: a command is neither accepted nor rejected
 };
 
-/// What the far side saw: the truth that the host is held against.
+/// Observations of the device, to compare with those of the host.
 struct DeviceRecord {
-  std::uint64_t made = 0;         ///< pose reports
-  std::uint64_t sent = 0;         ///< transfers answered with one
-  std::uint64_t unprepared = 0;   ///< reports that found no transfer of the host's waiting
-  std::uint64_t late_ticks = 0;   ///< of the device itself: then the machine is too slow for the test
-  std::uint64_t out_reports = 0;  ///< everything written to it, good or bad, by either way
-  std::uint64_t commands = 0;     ///< commands its firmware took
-  std::uint64_t refused = 0;      ///< commands its firmware did not take
+  std::uint64_t made = 0;         ///< number of pose reports
+  std::uint64_t sent = 0;         ///< number of transfers answered with a pose report
+  std::uint64_t unprepared = 0;   ///< reports without a pending transfer of the host
+  std::uint64_t late_ticks = 0;   ///< late ticks of the device itself: the machine is too slow for the test
+  std::uint64_t out_reports = 0;  ///< number of written reports, valid or not, by both paths
+  std::uint64_t commands = 0;     ///< commands that the firmware accepted
+  std::uint64_t rejected = 0;     ///< commands that the firmware rejected
   std::uint64_t halts_cleared = 0;
   bool motors_on = false;
   bool watchdog_tripped = false;
-  WrenchReport last;        ///< the last command that was one
-  std::size_t answers = 0;  ///< commands with the motors on: turn_arounds() so far
+  WrenchReport last;        ///< last valid command
+  std::size_t answers = 0;  ///< number of commands with the motors on, and of turn_arounds()
 };
 
-/// A device that follows devices/README.md, plugged into this machine: its firmware is the simulated one.
-/// High speed, bInterval 1.
+/// A device as in devices/README.md, connected to this machine, with the simulated firmware. High speed,
+/// bInterval 1.
 ///
-/// The handle moves along x: position_m() of each sequence number. A command tells by its force in x which
-/// pose it answers: one micronewton for each count of its sequence.
+/// The handle moves along x: position_m() of each sequence number. The force in x
+/// of a command encodes the pose that it answers: 1 uN per sequence number.
 class UsbipDevice final : public UsbipPort {
  public:
   using Identity = UsbIdentity;
@@ -59,14 +59,14 @@ class UsbipDevice final : public UsbipPort {
 
   void set(Trouble trouble);
   DeviceRecord record() const;
-  /// From each pose on the wire to the command that answers it.
+  /// Times from each transmitted pose to the command that answers it.
   std::vector<Duration> turn_arounds() const;
 
   static double position_m(std::uint64_t sequence) noexcept;
   static Wrench answer_to(std::uint64_t sequence) noexcept;
 
  private:
-  /// What is to be sent to the host.
+  /// Reports that wait for a transfer of the host.
   struct Outgoing {
     Bytes bytes;
     std::uint32_t sequence = 0;
@@ -88,7 +88,7 @@ class UsbipDevice final : public UsbipPort {
   DeviceProfile profile_;
   SimulatedFirmware firmware_;
 
-  // Under mutex_.
+  // Protected by mutex_.
   Trouble trouble_ = Trouble::none;
   DeviceRecord record_;
   std::vector<Duration> turn_arounds_;
@@ -97,7 +97,7 @@ class UsbipDevice final : public UsbipPort {
   Outgoing newest_;
   std::array<TimePoint, 1024> sent_at_{};
   TimePoint powered_{};
-  TimePoint next_{};  ///< report
+  TimePoint next_{};  ///< time of the next report
 };
 
 }  // namespace wrenchd::test

@@ -82,7 +82,7 @@ bool UsbipEmulator::on_vendor_request(std::uint8_t request, std::uint16_t value)
   return true;
 }
 
-/// What the chip has heard from what is behind it, a packet at a time.
+/// Returns the next packet of the serial chip.
 void UsbipEmulator::hear_chip() {
   constexpr std::size_t kPacket = 62;
   for (Bytes bytes = chip_->read(kPacket); !bytes.empty(); bytes = chip_->read(kPacket))

@@ -13,24 +13,24 @@
 
 namespace wrenchd::test {
 
-/// An emulated device plugged into this machine: the same that stands behind a LoopbackLink elsewhere, here
-/// with a real kernel between it and the host.
+/// An emulated device that is connected to this machine: the same as behind a LoopbackLink, but with a real
+/// kernel between it and the host.
 class UsbipEmulator final : public UsbipPort, private ReportSink {
  public:
-  /// The device must outlive this. `priority`: SCHED_FIFO, of the thread it lives on.
+  /// The device must outlive this. `priority`: SCHED_FIFO, of its thread.
   UsbipEmulator(EmulatedDevice& device, UsbIdentity identity, UsbShape shape, int priority);
-  /// The same behind an FTDI serial chip: each packet in begins with two bytes of modem status, which come
-  /// alone once a millisecond where there is nothing else, and requests of the vendor go to the chip.
+  /// The same behind an FTDI serial chip: each IN packet begins with two bytes of modem status. Without data
+  /// the chip sends them alone every millisecond. The chip answers vendor requests.
   UsbipEmulator(EmulatedDevice& device, SerialChip& chip, UsbIdentity identity, UsbShape shape, int priority);
   ~UsbipEmulator();
 
-  /// A hand on the device, while its thread keeps off.
+  /// Locks the device for the test; its thread waits.
   template <class F>
   auto with(F&& hand) {
     const std::lock_guard lock(mutex_);
     return hand();
   }
-  /// Reports of the host's that the device took, and the last of them, as it was on the wire.
+  /// Number of reports that the device accepted, and the bytes of the last one.
   std::uint64_t taken() const;
   std::vector<std::uint8_t> last_taken() const;
 

@@ -72,12 +72,13 @@ UsbipPort::~UsbipPort() {
   unplug();
 }
 
-// --- the plug ---------------------------------------------------------------------------------------------
+// --- connection
+// ---------------------------------------------------------------------------------------------
 
 void UsbipPort::plug(int port) {
   std::array<int, 2> pair{};
   if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair.data()) != 0) throw std::runtime_error("no socket pair");
-  // The controller needs a while to get over what was in the port before.
+  // The controller needs time after the previous device of the port.
   bool attached = false;
   for (int i = 0; i < 1000 && !attached; ++i) {
     if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -144,7 +145,7 @@ void UsbipPort::serve_host(bool& connected) {
   received_bytes_ -= done;
 }
 
-/// Serves the first message in the bytes. Returns its length, or 0 where it is not complete yet.
+/// Processes the first message in the bytes. Returns its length; 0 if it is incomplete.
 std::size_t UsbipPort::serve(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kHeader) return 0;
   const std::uint32_t number = word(bytes, 4);
@@ -195,8 +196,8 @@ void UsbipPort::control(std::uint32_t number, std::span<const std::uint8_t> setu
   reply(number, 0, static_cast<std::uint32_t>(in ? answer->size() : data.size()), *answer);
 }
 
-/// USB 2.0, section 9.4, and HID 1.11, section 7: what a host asks of a device like this. Nothing where the
-/// answer is a stall.
+/// Answers the standard requests of USB 2.0, section 9.4, and HID 1.11, section 7. Empty: the answer is a
+/// stall.
 std::optional<UsbipPort::Bytes> UsbipPort::answer_control(std::span<const std::uint8_t> setup,
                                                           std::span<const std::uint8_t> data) {
   constexpr unsigned get_status = 0, clear_feature = 1, get_descriptor = 6, get_configuration = 8,
@@ -290,7 +291,7 @@ void UsbipPort::reply(std::uint32_t number, std::int32_t status, std::uint32_t l
 }
 
 void UsbipPort::send(std::span<const std::uint8_t> bytes) const {
-  ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);  // one that is cut off is seen by recv()
+  ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);  // recv() detects a closed connection
 }
 
 }  // namespace wrenchd::test

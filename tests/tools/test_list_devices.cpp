@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/hex_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tools/list_devices.hpp"
@@ -265,7 +266,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
 
 TEST_CASE("invalid profiles are listed below the devices", "[list_devices]") {
   KnownProfiles known = kShipped;
-  known.refused = {"profiles/mine.toml:3:1: key 'x' is not known"};
+  known.rejected = {"profiles/mine.toml:3:1: key 'x' is not known"};
   const std::string text = device_list(std::vector{space_navigator_in(1)}, known, false, open_to_all);
   CHECK(holds(text, "\n  profile spacemouse_split: "));
   CHECK(
@@ -292,13 +293,6 @@ TEST_CASE("control characters from devices are not printed", "[list_devices]") {
 
 #if !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)  // umockdev and the sanitizers must both be loaded first
-std::string hex_of(const Bytes& bytes) {
-  std::string text;
-  for (const std::uint8_t byte : bytes)
-    text += {"0123456789ABCDEF"[byte >> 4U], "0123456789ABCDEF"[byte & 15U]};
-  return text;
-}
-
 /// Returns a HID device in the format of umockdev-record: USB device, interface, HID device and node.
 std::string mock_hid(int port, const std::string& vendor, const std::string& product, const std::string& name,
                      const std::string& serial, const Bytes& descriptor) {
@@ -312,7 +306,7 @@ std::string mock_hid(int port, const std::string& vendor, const std::string& pro
          (serial.empty() ? "" : "\nA: serial=" + serial) + "\n\nP: " + interface +
          "\nE: DEVTYPE=usb_interface\nE: SUBSYSTEM=usb\nA: bInterfaceNumber=00\nA: "
          "bInterfaceClass=03\n\nP: " +
-         hid_device + "\nE: SUBSYSTEM=hid\nH: report_descriptor=" + hex_of(descriptor) +
+         hid_device + "\nE: SUBSYSTEM=hid\nH: report_descriptor=" + hex_text(descriptor) +
          "\n\nP: " + hid_device + "/hidraw/hidraw" + n + "\nN: hidraw" + n +
          "\nE: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw" + n + "\nE: MAJOR=243\nE: MINOR=" + n + "\n\n";
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tools/mutate: the mutants it finds, the sample it draws, the survivors it reports, the explanations it refuses.
+"""tools/mutate: the mutants it finds, the sample it draws, the survivors it reports, the explanations it rejects.
 
 Each test works on a source tree of its own: a library of one function and a test program.
 """
@@ -120,7 +120,7 @@ class Operators(unittest.TestCase):
 
 
 class Explanations(unittest.TestCase):
-    ENTRY = "file: sample.cpp\nfunction: limited\nline: if (!on) return 0.0;\nmutation: {}\nreason: nobody asks\n"
+    ENTRY = "file: sample.cpp\nfunction: limited\nline: if (!on) return 0.0;\nmutation: {}\nreason: unused\n"
 
     def check(self, text):
         lines = SAMPLE.splitlines()
@@ -143,7 +143,7 @@ class Explanations(unittest.TestCase):
             with self.assertRaises(explained.Stale):
                 self.check(wrong)
 
-    def test_an_entry_without_a_reason_is_refused(self):
+    def test_an_entry_without_a_reason_is_rejected(self):
         with self.assertRaises(explained.Stale):
             explained.read_explanations("file: a.cpp\nline: x;\nmutation: *\n")
         with self.assertRaises(explained.Stale):
@@ -184,7 +184,7 @@ TREE = {
         target_link_libraries(toy toy_core)
         add_test(NAME toy COMMAND toy)
         """,
-    # hidden() is called, but what it returns is looked at loosely.
+    # hidden() is called, but its result is checked loosely.
     "tests/toy.cpp": """\
         #include "core/toy.hpp"
         int main() {

@@ -11,6 +11,7 @@
 #include "devices/profile_reports.hpp"
 #include "devices/six_axes.hpp"
 #include "tests/support/case_count.hpp"
+#include "tests/support/hex_text.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
@@ -371,13 +372,6 @@ TEST_CASE("wrenchctl profile reads bytes and hexadecimal text alike", "[propose_
 
 #if !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)  // umockdev and the sanitizers must both be loaded first
-std::string hex_of(const Bytes& bytes) {
-  std::string text;
-  for (const std::uint8_t byte : bytes)
-    text += {"0123456789ABCDEF"[byte >> 4U], "0123456789ABCDEF"[byte & 15U]};
-  return text;
-}
-
 /// Returns the number as four bytes, little-endian.
 Bytes four_bytes(std::size_t x) {
   return {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(x >> 8U), 0, 0};
@@ -396,9 +390,9 @@ TEST_CASE("wrenchctl profile reads the report descriptor of a hidraw device from
   std::string name = "3Dconnexion SpaceNavigator";
   name.resize(255);
   const auto answers = dir.write(
-      "answers", "@DEV /dev/hidraw0\nHIDIOCGRDESCSIZE 0 " + hex_of(four_bytes(descriptor.size())) +
-                     "\nHIDIOCGRDESC 0 " + hex_of(answer) + "\nHIDIOCGRAWINFO 0 030000006D0426C6\n" +
-                     "HIDIOCGRAWNAME 27 " + hex_of({name.begin(), name.end()}) + "\n");
+      "answers", "@DEV /dev/hidraw0\nHIDIOCGRDESCSIZE 0 " + hex_text(four_bytes(descriptor.size())) +
+                     "\nHIDIOCGRDESC 0 " + hex_text(answer) + "\nHIDIOCGRAWINFO 0 030000006D0426C6\n" +
+                     "HIDIOCGRAWNAME 27 " + hex_text(Bytes(name.begin(), name.end())) + "\n");
   const std::string out = (dir.path() / "out").string();
   const std::string command = "umockdev-run -d " + device.string() + " -i /dev/hidraw0=" + answers.string() +
                               " -- " WRENCHD_BINARY_DIR "/wrenchctl profile --from /dev/hidraw0 -o " + out;

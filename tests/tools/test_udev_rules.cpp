@@ -90,7 +90,7 @@ TEST_CASE("unusable and simulated devices have no rule", "[udev_rules]") {
 }
 
 TEST_CASE("every shipped profile has rules for each of its ids, and none is open to all", "[udev_rules]") {
-  REQUIRE(kShipped.refused.empty());
+  REQUIRE(kShipped.rejected.empty());
   const std::string text = udev_rules(kShipped.profiles);
   int ids = 0;
   for (const DeviceProfile& shipped : kShipped.profiles) {

@@ -736,7 +736,7 @@ TEST_CASE("wrenchctl decode and encode reject invalid input with location and re
   rejects({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', is a single digit");
   rejects({"decode", "loopback", "--hex", "01 02"},
           "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
-  rejects({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
+  rejects({"decode", "missing", "--hex", "01"}, "no such file; searched ");
   rejects({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
   rejects({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
   rejects({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");

@@ -43,7 +43,7 @@ export const file = (name) => join(directory, name);
 
 /** A program that runs beside the test; out: its output. */
 export function start(program, words) {
-  // Flight recordings go where the test goes.
+  // Flight recordings are written to the directory of the test.
   const child = spawn(join(binaries, program), words, { env: { ...process.env, XDG_STATE_HOME: directory } });
   const one = { child, out: "", err: "", ended: new Promise((done) => child.on("close", done)) };
   child.stdout.on("data", (data) => (one.out += data));

@@ -33,9 +33,9 @@ test(async () => {
   await page.mouse.up();
   const turned = (await camera()).eye;
   assert.ok(away(turned, [-0.1, 0.25, 0.1]) > 0.01);
-  const told = (await camera()).sceneCount;
+  const previousCount = (await camera()).sceneCount;
   wrenchd.child.kill("SIGHUP");
-  await until("the scene arrives again", async () => (await camera()).sceneCount > told);
+  await until("the scene arrives again", async () => (await camera()).sceneCount > previousCount);
   assert.ok(away((await camera()).eye, turned) < 1e-9);
   await page.keyboard.press("f");
   await until("Fit goes back", seen_from([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]));

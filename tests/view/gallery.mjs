@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every scene of the gallery at the moment that shows its point: it looks as in tests/data/gallery/NAME.png.
-//   node gallery.mjs [--anew] [NAME...]    --anew: makes the pictures, and tools/view/view.png of README.md
+// Compares every scene of the gallery, at its most characteristic moment, with tests/data/gallery/NAME.png.
+//   node gallery.mjs [--renew] [NAME...]    --renew: writes the pictures and tools/view/view.png of README.md
 import assert from "node:assert/strict";
 import { existsSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
@@ -19,11 +19,11 @@ const MOMENTS_s = {
 };
 const README = "peg_in_hole";
 const SIZE = { width: 1280, height: 720 };
-// Blocks even out the edges of another rasteriser; what is missing or elsewhere changes whole blocks.
+// Compares means of blocks: they do not depend on the rasteriser's edges, but a missing or moved body changes them.
 const BLOCK_px = 12, LEAST_CHANGE = 14, MOST_BLOCKS = 8;
 
 const words = process.argv.slice(2);
-const anew = words.includes("--anew");
+const renew = words.includes("--renew");
 const names = words.filter((word) => !word.startsWith("--"));
 const pictureOf = (name) => join(source, "tests/data/gallery", `${name}.png`);
 
@@ -81,18 +81,18 @@ test(async () => {
   for (const name of names.length > 0 ? names : all) {
     const { page, server } = await shown(name, MOMENTS_s[name]);
     const picture = await page.screenshot({ clip: await page.locator("#canvas").boundingBox() });
-    if (anew) {
+    if (renew) {
       writeFileSync(pictureOf(name), picture);
       if (name === README) {
         await sleep(5000);  // the curves are drawn less often than the scene
         writeFileSync(join(source, "tools/view/view.png"), await page.screenshot());
       }
     } else {
-      assert.ok(existsSync(pictureOf(name)), `${pictureOf(name)} is not there; node gallery.mjs --anew makes it`);
+      assert.ok(existsSync(pictureOf(name)), `${pictureOf(name)} is not there; node gallery.mjs --renew makes it`);
       const blank = await (await page.context().browser().newContext()).newPage();
       const count = await differing(blank, [picture, readFileSync(pictureOf(name))]);
       console.log(`${name}: ${count} blocks differ`);
-      assert.ok(count <= MOST_BLOCKS, `${name} looks different: ${count} blocks of ${BLOCK_px} pixels`);
+      assert.ok(count <= MOST_BLOCKS, `${name} differs: ${count} blocks of ${BLOCK_px} pixels`);
       await blank.close();
     }
     assert.deepEqual(page.complaints(), []);

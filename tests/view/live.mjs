@@ -39,7 +39,7 @@ test(async () => {
   await until("it is disarmed without a cause", async () => {
     await armed();
     await page.keyboard.press("d");
-    await until("it is let go", async () => ["disarmed", "fault"].includes(await state()));
+    await until("it is released", async () => ["disarmed", "fault"].includes(await state()));
     const { state: now, lease, cause } = await wrenchd.status();
     return now === "disarmed" && lease === null && cause === null;
   });
@@ -89,6 +89,6 @@ test(async () => {
 
   // The page shows that the view has ended.
   server.child.kill("SIGTERM");
-  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-title")));
+  await until("the page reports that the server is gone", async () => /wrenchctl view/.test(await text(again, "banner-title")));
   await sleep(100);
 });

@@ -27,7 +27,7 @@ class DaemonCommands final : public Subcommand {
     })->add_option("method", options_.method, "name of a method; without it, all methods");
     add_record(app);
     for (const auto& [name, description] :
-         {std::pair{"disarm", "Fade the force out, whichever client armed"},
+         {std::pair{"disarm", "Fade the force out, no matter which client armed"},
           std::pair{"stop", "Emergency stop; requires no lease"},
           std::pair{"acknowledge", "Clear a latched fault or stop after an inspection"},
           std::pair{"reload", "Load the configuration again"}})

@@ -101,7 +101,7 @@ class DeviceCommands final : public Subcommand {
   void run_udev_rules() const {
     const SearchPath search = profile_directory_.empty() ? SearchPath() : SearchPath({profile_directory_});
     const KnownProfiles known = known_profiles(search);
-    if (!known.refused.empty()) throw std::runtime_error(known.refused.front());
+    if (!known.rejected.empty()) throw std::runtime_error(known.rejected.front());
     if (known.profiles.empty())
       throw std::runtime_error(
           (profile_directory_.empty() ? "the search path" : profile_directory_.string()) +

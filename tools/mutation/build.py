@@ -13,7 +13,7 @@ import subprocess
 
 
 class CannotBuild(Exception):
-    """The compiler or the linker refused; says what it wrote."""
+    """The compiler or the linker rejected the source; contains its output."""
 
 
 def read_ninja(directory, *arguments):
@@ -21,7 +21,7 @@ def read_ninja(directory, *arguments):
 
 
 class ReleaseBuild:
-    """What the build directory knows. root: of the source tree; directory: of a build that is up to date."""
+    """Commands and dependencies of a build. root: source tree; directory: an up-to-date build directory."""
 
     def __init__(self, root, directory):
         self.root = root
@@ -62,7 +62,7 @@ class ReleaseBuild:
         return kept
 
     def clang_arguments(self, source):
-        """What clang needs to read the source as gcc does."""
+        """Returns the options with which clang parses the source as gcc does."""
         return self.compiler_words(source, precompiled=False)[1:]
 
     def link_words(self, program):
@@ -104,7 +104,7 @@ class ReleaseBuild:
         self._run(words + flags + ["-o", made, "-c", text_at])
 
     def link(self, program, made, objects):
-        """Links bin/`program` anew as `made`, with the objects (source -> file) in the place of those built."""
+        """Links bin/`program` again as `made`, with these objects (source -> file) instead of the built ones."""
         words = list(self.link_words(program))
         in_front = []
         for source, file in objects.items():

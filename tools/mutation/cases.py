@@ -26,7 +26,7 @@ class TestCase:
     directory: str
     source: str  # of the test case, relative to the root; empty if the program is one test
     environment: tuple = ()
-    must_print: str = ""  # a test that is passed by what it prints, not by its exit code
+    must_print: str = ""  # text that the test must print to pass; empty: its exit code decides
     skip_code: int = -1
 
     @property
@@ -43,7 +43,7 @@ LEFT_OUT_LABELS = {"wall_time", "system"}
 
 
 def read_cases(build):
-    """All tests of programs that link what is ours, by name."""
+    """Returns all tests of programs that link the project's libraries, by name."""
     shown = subprocess.run(["ctest", "--show-only=json-v1"], cwd=build.directory, check=True, capture_output=True, text=True)
     bins = build.directory + "/bin/"
     cases, catch = {}, {}
@@ -97,7 +97,7 @@ class Outcome:
 
 
 def run_cases(cases, program, limit_s, scratch, trace=""):
-    """Runs test cases of one program in one process, up to the first that goes red.
+    """Runs test cases of one program in one process, until the first failure.
 
     program: the executable to run in the place of the one built. scratch: a directory for everything they write.
     """

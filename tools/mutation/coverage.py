@@ -20,7 +20,7 @@ import sys
 
 import cases as test_cases
 
-# Blocks stay where the source has them, each with a call of its own.
+# Compiler options that keep the blocks of the source, each with its own trace call.
 TRACE_FLAGS = [
     "-O1", "-g1", "-w", "-fsanitize-coverage=trace-pc", "-fno-reorder-blocks", "-fno-if-conversion",
     "-fno-if-conversion2", "-fno-ssa-phiopt", "-fno-tree-sink",
@@ -54,7 +54,7 @@ class Coverage:
 
 
 def find_coverage(build, sources, cases, place, jobs, log):
-    """Builds the traced programs in the directory `place`, runs what has changed since the last time."""
+    """Builds the traced programs in the directory `place` and runs the tests that changed since the last run."""
     os.makedirs(place, exist_ok=True)
     programs = sorted({case.program for case in cases.values()})
     objects = _build_traced(build, sources, programs, place, jobs, log)

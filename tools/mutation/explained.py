@@ -4,7 +4,7 @@
 An entry has the fields file, function, line, mutation and reason; an empty line ends it; # begins a comment.
 line is the text of the source line, mutation the change as the table of survivors shows it. `*` stands for every
 change of the line, and `constant *` for every change by one operator. An entry whose line is no longer in that
-function, or that matches no mutant, is stale and refused.
+function, or that matches no mutant, is stale and rejected.
 """
 
 import dataclasses

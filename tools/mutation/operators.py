@@ -176,7 +176,7 @@ class _Finder:
         if parents:
             self._statement(cursor, parents)
 
-    # -- where things stand ---------------------------------------------------------------------------------
+    # -- positions in the source ---------------------------------------------------------------------------------
 
     def _source(self, cursor):
         return self.text[cursor.extent.start.offset : cursor.extent.end.offset].decode()
@@ -357,7 +357,7 @@ class _Finder:
             self._add("drop", cursor.extent.start.offset, text, "")
 
     def _stands_alone(self, cursor, parent):
-        """Whether the cursor is a statement of its own: behind it comes a semicolon, before it no condition."""
+        """Returns whether the cursor is a complete statement: a semicolon follows, and no condition precedes it."""
         behind = self.text[cursor.extent.end.offset : cursor.extent.end.offset + 40].lstrip()
         if not behind.startswith(b";"):
             return False
@@ -402,7 +402,7 @@ def _is_relation(cursor):
 
 
 def _shape(cursor):
-    """real, whole, pointer, text, stream or other: what an operand is to an operator."""
+    """Returns the class of an operand: real, whole, pointer, text, stream or other."""
     kind = cursor.type.get_canonical()
     if kind.kind in (TypeKind.LVALUEREFERENCE, TypeKind.RVALUEREFERENCE):
         kind = kind.get_pointee().get_canonical()

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mutation run behind tools/mutate: changes the source in small ways and counts the changes no test sees."""
+"""The mutation run behind tools/mutate: makes small changes of the source and counts the changes that no test detects."""
 
 import argparse
 import collections
@@ -27,16 +27,16 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 ROOMS = ("core/", "collision/", "devices/", "daemon/servo/")
 # A header that more sources read costs minutes of compiling a mutant; its functions are left out.
 MOST_USERS = 8
-# Slices of the usual time of the tests, within which a mutant is looked at for red: short ones first.
+# Time slices for the tests of a mutant, as shares of the usual time: short ones first.
 SLICES_S = (2.0, 6.0, 20.0, 60.0)
-# A mutant's tests may take this many times as long as usual, and this much longer, before it counts as hung.
+# A mutant counts as hung if its tests take longer than the usual time by this factor plus this time.
 PATIENCE, PATIENCE_S = 4.0, 5.0
 LIST = "tests/mutants_explained.txt"
 
 
 @dataclasses.dataclass
 class Verdict:
-    kind: str  # seen, survived, refused
+    kind: str  # seen, survived, rejected
     words: str = ""  # the test that saw it, or why it could not be built
     tests: int = 0
     seconds: float = 0.0
@@ -73,7 +73,7 @@ def parse_arguments():
 
 
 def population(build, place, jobs):
-    """All mutants of the rooms, sorted. Lists of sources that have not changed are taken from the last run."""
+    """Returns all mutants of the rooms, sorted. Reuses the lists of the last run for unchanged sources."""
     sources = sorted(s for s in build.compilers if s.startswith(ROOMS))
     with open(operators.__file__, "rb") as file:
         version = file.read()
@@ -119,7 +119,7 @@ def _list_mutants(work):
 
 
 class Judge:
-    """Builds mutants and shows them to the tests that run the changed line."""
+    """Builds mutants and runs the tests that cover the changed line."""
 
     def __init__(self, build, cases, coverage, place, unchanged):
         self.build = build
@@ -168,7 +168,7 @@ class Judge:
             objects = self._compile(mutant, scratch)
             verdict = self._show(mutant, tests, objects, scratch)
         except CannotBuild as error:
-            verdict = Verdict("refused", str(error))
+            verdict = Verdict("rejected", str(error))
         verdict.seconds = time.monotonic() - started
         if verdict.kind == "survived" and not reached:
             verdict.words = "no test runs the line"
@@ -208,7 +208,7 @@ class Judge:
                 if not outcome.red:
                     run += len(batch)
                     break
-                # Alone once more: a test may have been red for another reason, or for what ran before it.
+                # Repeats the test alone: it may have failed for another reason, or because of a previous test.
                 suspects = [c for c in batch if c.name == outcome.first_red] or batch
                 for case in suspects:
                     if len(batch) > 1 or not self.unchanged:
@@ -273,7 +273,7 @@ def draw(found, arguments, build):
 
 
 def run(judge, order, count, explained, jobs, place):
-    """Judges mutants until `count` are seen or have survived. Returns them with their verdicts, in order."""
+    """Tests mutants until `count` are detected or survive. Returns them with their verdicts, in order."""
     lines = {}
 
     def lines_of(file):
@@ -308,7 +308,7 @@ def run(judge, order, count, explained, jobs, place):
                 index, scratch = in_flight.pop(future)
                 free.append(scratch)
                 verdict = results[index] = future.result()
-                judged += verdict.kind != "refused"
+                judged += verdict.kind != "rejected"
                 mutant = order[index]
                 log(f"[{judged}/{min(count, len(order))}, {time.monotonic() - started:.0f} s] {verdict.kind:8} "
                     f"{mutant.file}:{mutant.line} {mutant.operator} {mutant.shown[:70]} "
@@ -322,7 +322,7 @@ def report(order, results, reasons, arguments, seconds):
     """Prints the table of survivors and the rate. Returns the exit code."""
     survivors = [(order[i], v) for i, v in sorted(results.items()) if v.kind == "survived"]
     seen = sum(v.kind == "seen" for v in results.values())
-    refused = sum(v.kind == "refused" for v in results.values())
+    rejected = sum(v.kind == "rejected" for v in results.values())
     if survivors:
         rows = [(f"{m.file}:{m.line}", m.function or m.declares, m.shown, v.words) for m, v in survivors]
         widths = [max(len(row[i]) for row in rows) for i in range(2)]
@@ -332,8 +332,8 @@ def report(order, results, reasons, arguments, seconds):
     total = seen + len(survivors)
     rate = 100.0 * seen / total if total else 100.0
     dead = sum(bool(v.words) for _, v in survivors)
-    print(f"\nseen {seen} of {total} mutants: {rate:.1f} %; {len(survivors)} survived, {dead} of them where no test runs")
-    print(f"left out: {len(reasons)} that {LIST} explains, {refused} that the compiler refuses; "
+    print(f"\nseen {seen} of {total} mutants: {rate:.1f} %; {len(survivors)} survived, {dead} in lines that no test runs")
+    print(f"left out: {len(reasons)} that {LIST} explains, {rejected} that the compiler rejects; "
           f"seed {arguments.seed}, {seconds / 60:.1f} minutes")  # fmt: skip
     if arguments.at_least is not None and rate < arguments.at_least:
         print(f"fewer than the {arguments.at_least:g} % asked for")

@@ -19,7 +19,7 @@ void __sanitizer_cov_trace_pc() noexcept;
 namespace {
 
 /// One byte for each byte of code: 1 if the block that returns there has run. Pages that are
-/// never written take no memory.
+/// never written need no memory.
 unsigned char* ran() noexcept {
   static unsigned char* const bytes = [] {
     const auto size = static_cast<std::size_t>(&etext - &__executable_start);

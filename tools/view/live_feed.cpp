@@ -214,9 +214,9 @@ RollingHistogram::Summary LiveFeed::wake_latency() const {
   return wake_latency_.summary();
 }
 
-void LiveFeed::with_history(const std::function<void(const MinMaxHistory&)>& look) const {
+void LiveFeed::with_history(const std::function<void(const MinMaxHistory&)>& visit) const {
   const std::scoped_lock lock(mutex_);
-  look(history_);
+  visit(history_);
 }
 
 std::vector<std::string> LiveFeed::events() {

@@ -61,7 +61,7 @@ class LiveFeed {
   RollingHistogram::Summary tick_duration() const;
   RollingHistogram::Summary wake_latency() const;
   /// Calls the function with the history while the mutex is locked.
-  void with_history(const std::function<void(const MinMaxHistory&)>& look) const;
+  void with_history(const std::function<void(const MinMaxHistory&)>& visit) const;
   /// Returns the events since the last call as JSON texts, oldest first.
   std::vector<std::string> events();
   std::string state() const;  ///< loop state of the newest tick

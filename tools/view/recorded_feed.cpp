@@ -82,11 +82,9 @@ Json RecordedFeed::state_changes() const {
   const TickRecord* before = nullptr;
   for (const TickRecord& record : recording_.ticks) {
     if (before == nullptr || before->state != record.state || before->state_cause != record.state_cause)
-      out.push_back(
-          {{"t", static_cast<double>(record.now_ns - begin_ns()) / kNs},
-           {"state", wrenchd::name(static_cast<State>(record.state))},
-           {"cause", record.state_cause == 0 ? std::string_view("none")
-                                             : fault_row(static_cast<Fault>(record.state_cause)).name}});
+      out.push_back({{"t", static_cast<double>(record.now_ns - begin_ns()) / kNs},
+                     {"state", wrenchd::name(static_cast<State>(record.state))},
+                     {"cause", fault_row(record.state_cause).name}});
     before = &record;
   }
   return out;

@@ -16,7 +16,7 @@ Vector3d vector_of(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
 }
 
-Pose pose_of(const Json& x) {
+Pose pose_from_json(const Json& x) {
   const auto at = [&](std::size_t i) { return x.at(i).get<double>(); };
   return {Quaterniond(at(6), at(3), at(4), at(5)).normalized(), {at(0), at(1), at(2)}};
 }
@@ -28,7 +28,7 @@ ObstacleMotion motion_of(const Json& json) {
 }
 
 std::optional<ScheduledMotion> later_of(const Json& json) {
-  return ScheduledMotion{json.at("start_s").get<double>(), pose_of(json.at("X_WO")),
+  return ScheduledMotion{json.at("start_s").get<double>(), pose_from_json(json.at("X_WO")),
                          motion_of(json.at("motion"))};
 }
 
@@ -62,8 +62,8 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     : shapes_(description.at("geometry_id").get<std::uint64_t>()),
       rendering_id_(description.at("rendering_id").get<std::uint32_t>()),
       start_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
-      X_WB_(pose_of(description.at("X_WB"))),
-      X_HT_(pose_of(description.at("X_HT"))),
+      X_WB_(pose_from_json(description.at("X_WB"))),
+      X_HT_(pose_from_json(description.at("X_HT"))),
       about_handle_(description.at("wrench_about") == "handle") {
   const Json& meshes = description.at("meshes");
   std::size_t all = 0;
@@ -104,7 +104,7 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
       shown["mesh"] = one.at("mesh");
       shown["pose"] = one.at("X_WO");
       if (one.contains("motion") || one.contains("scheduled"))
-        moving_obstacles_.push_back({number, pose_of(one.at("X_WO")),
+        moving_obstacles_.push_back({number, pose_from_json(one.at("X_WO")),
                                      one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
                                      one.contains("scheduled") ? later_of(one["scheduled"]) : std::nullopt});
       shown["moves"] = one.contains("motion") || one.contains("scheduled");

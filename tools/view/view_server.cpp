@@ -349,11 +349,11 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
     const bool from_us = origin == request_.end() || server_.is_our_origin(origin->value());
     const bool upgrade = websocket::is_upgrade(request_);
     if (!server_.is_ours(request_[http::field::host]) || !from_us || (upgrade && origin == request_.end()))
-      return refuse(http::status::forbidden,
+      return reject(http::status::forbidden,
                     "Only browsers that open the address from wrenchctl view may load this page.\n");
     const auto name = requested_path();
     if (!name)
-      return refuse(http::status::forbidden,
+      return reject(http::status::forbidden,
                     "The address is incomplete; open the whole address that wrenchctl view printed.\n");
     if (upgrade && *name == "live") {
       stream_.expires_never();
@@ -362,13 +362,13 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
       return;
     }
     if (request_.method() != http::verb::get && request_.method() != http::verb::head)
-      return refuse(http::status::method_not_allowed, "Only the method GET is supported.\n");
+      return reject(http::status::method_not_allowed, "Only the method GET is supported.\n");
     const PageFiles::File* file = server_.files.find(*name);
-    if (file == nullptr) return refuse(http::status::not_found, "The file does not exist.\n");
+    if (file == nullptr) return reject(http::status::not_found, "The file does not exist.\n");
     respond(http::status::ok, file->type, file->bytes);
   }
 
-  void refuse(http::status status, const char* why) { respond(status, "text/plain; charset=utf-8", why); }
+  void reject(http::status status, const char* why) { respond(status, "text/plain; charset=utf-8", why); }
 
   void respond(http::status status, const std::string& type, const std::string& body) {
     auto response = std::make_shared<http::response<http::string_body>>(status, request_.version());

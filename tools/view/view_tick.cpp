@@ -21,10 +21,6 @@ double length(double x, double y, double z) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 Json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
@@ -60,7 +56,7 @@ struct HandWrench {
 HandWrench hand_wrench(const ViewTick& tick, const ViewScene* scene) {
   const Vector3d force(tick.F_out[0], tick.F_out[1], tick.F_out[2]),
       torque(tick.F_out[3], tick.F_out[4], tick.F_out[5]);
-  const Pose X_WP = pose_of(tick.X_WP);
+  const Pose X_WP = pose_from_numbers(tick.X_WP);
   if (scene == nullptr) return {X_WP.translation_m, force, torque};
   const Vector3d p_WH_m = X_WP * inverse(scene->X_HT()).translation_m;
   if (!scene->wrench_about_handle()) return {p_WH_m, force, torque - p_WH_m.cross(force)};
@@ -85,7 +81,9 @@ double ViewTick::depth_m() const noexcept {
 
 double ViewTick::angle_rad() const noexcept {
   if (!proxy_valid()) return std::nan("");
-  return rotation_vector((pose_of(X_WP).rotation.conjugate() * pose_of(X_WQ).rotation).normalized()).norm();
+  return rotation_vector(
+             (pose_from_numbers(X_WP).rotation.conjugate() * pose_from_numbers(X_WQ).rotation).normalized())
+      .norm();
 }
 
 ChannelValues ViewTick::channels() const noexcept {
@@ -143,10 +141,9 @@ ViewTick view_tick(const TickRecord& record) {
 }
 
 ViewStatus view_status(const TickRecord& record, std::vector<ProxyContact> contacts) {
-  const auto cause = static_cast<Fault>(record.state_cause);
   ViewStatus status;
   status.state = name(static_cast<State>(record.state));
-  status.cause = cause == Fault::none ? "none" : std::string(fault_row(cause).name);
+  status.cause = fault_row(record.state_cause).name;
   status.limits = bits_text(record.limit_causes, ValueNames::limit_bits);
   status.proxy_initialization = name(static_cast<ProxyInitialization>(record.proxy_initialization));
   status.contact_count = record.contacts;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cctype>
+#include <set>
 
 #include <catch2/catch.hpp>
 
 #include "config/config_error.hpp"
+#include "config/setting_table.hpp"
 #include "tests/support/control_rig.hpp"
 
 namespace wrenchd {
@@ -19,7 +21,7 @@ struct Table {
   const MethodTable& methods = control.methods();
 };
 
-RpcError refused(const MethodTable& table, const std::string& method, const Json& params, Role role) {
+RpcError rejected(const MethodTable& table, const std::string& method, const Json& params, Role role) {
   try {
     table.look_up({method, params, 1, true}, role);
   } catch (const RpcError& error) {
@@ -79,7 +81,7 @@ TEST_CASE("every method is documented, accepts its own parameters and rejects al
 
     Json more = good;
     more["no_such_thing"] = 1;
-    const RpcError unknown = refused(t.methods, name, more, Role::administrator);
+    const RpcError unknown = rejected(t.methods, name, more, Role::administrator);
     CHECK(unknown.code() == RpcCode::invalid_params);
     CHECK(says(unknown, "'no_such_thing'"));
     for (const ParamRow& param : row.params) {
@@ -88,13 +90,13 @@ TEST_CASE("every method is documented, accepts its own parameters and rejects al
       for (const Json& wrong : kWrongForAll) {
         Json bad = good;
         bad[param.name] = wrong;
-        const RpcError error = refused(t.methods, name, bad, Role::administrator);
+        const RpcError error = rejected(t.methods, name, bad, Role::administrator);
         CHECK(error.code() == RpcCode::invalid_params);
         CHECK(says(error, "'" + param.name + "' must be " + type_text(param.type)));
       }
       Json less = good;
       less.erase(param.name);
-      if (param.required) CHECK(says(refused(t.methods, name, less, Role::administrator), "is missing"));
+      if (param.required) CHECK(says(rejected(t.methods, name, less, Role::administrator), "is missing"));
       if (!param.required) CHECK_NOTHROW(t.methods.look_up({name, less, 1, true}, row.min_role));
     }
   }
@@ -102,20 +104,20 @@ TEST_CASE("every method is documented, accepts its own parameters and rejects al
 
 TEST_CASE("every method rejects each role below its minimum role, with any parameters", "[control_methods]") {
   const Table t;
-  int refusals = 0;
+  int rejections = 0;
   for (const auto& [name, row] : t.methods.methods())
     for (const Role role : {Role::observer, Role::operator_}) {
       if (role >= row.min_role) continue;
       INFO(name);
       for (const Json& params : {good_params(row), Json{{"no_such_thing", 1}}}) {
-        const RpcError error = refused(t.methods, name, params, role);
+        const RpcError error = rejected(t.methods, name, params, role);
         CHECK(error.code() == RpcCode::permission_denied);
         CHECK(error.details()["min_role"] == wrenchd::name(row.min_role));
         CHECK(says(error, "group '"));
-        ++refusals;
+        ++rejections;
       }
     }
-  CHECK(refusals >= 10);
+  CHECK(rejections >= 10);
 }
 
 TEST_CASE("observers may stop and read; arming requires the role operator", "[control_methods]") {
@@ -129,13 +131,28 @@ TEST_CASE("observers may stop and read; arming requires the role operator", "[co
 
 TEST_CASE("an unknown method or parameter is rejected with the nearest known name", "[control_methods]") {
   const Table t;
-  const RpcError error = refused(t.methods, "lease_acquire", Json::object(), Role::observer);
+  const RpcError error = rejected(t.methods, "lease_acquire", Json::object(), Role::observer);
   CHECK(error.code() == RpcCode::method_not_found);
   CHECK(says(error, "did you mean 'lease.acquire'?"));
-  CHECK(says(refused(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
+  CHECK(says(rejected(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
              "there is no parameter 'event'; did you mean 'events'?"));
-  CHECK(refused(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
+  CHECK(rejected(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
         RpcCode::method_not_found);
+}
+
+TEST_CASE("describe returns each key of the setting table once, with the effect of its reload",
+          "[control_methods]") {
+  const Table t;
+  const Json description = t.methods.describe();
+  std::set<std::string> described;
+  for (const Json& setting : description["settings"]) {
+    CHECK(described.insert(setting["name"]).second);
+    CHECK(setting["on_reload"].get<std::string>().size() > 5);
+  }
+  std::set<std::string> keys;
+  for (const Setting& setting : setting_table())
+    if (setting.read != nullptr) keys.insert(setting.name());
+  CHECK(described == keys);
 }
 
 TEST_CASE("describe returns every method, event, error and role", "[control_methods]") {

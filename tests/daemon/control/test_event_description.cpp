@@ -25,7 +25,7 @@ TEST_CASE("each event is described by one line, a fault with its cure", "[events
   CHECK(text(Event::FaultRaised{Fault::tick_late, 0.0305}).find(" (30.5 ms); ") != std::string::npos);
   CHECK(text(Event::FaultRaised{Fault::self_test_rate, 499.7}).find(" (500 reports/s); ") !=
         std::string::npos);
-  CHECK(text(Event::ArmingRefused{State::fault}) ==
+  CHECK(text(Event::ArmingRejected{State::fault}) ==
         std::string("not armed: ") + transition(Trigger::arm, State::fault).reason);
   CHECK(text(Event::StiffnessScaled{0.25}).find("25 %") != std::string::npos);
 }

@@ -9,7 +9,7 @@ namespace {
 
 RpcRequest request_of(const std::string& line) {
   auto read = parse_request(line);
-  if (const auto* refused = std::get_if<InvalidRequest>(&read)) FAIL(line << ": " << refused->error.what());
+  if (const auto* rejected = std::get_if<InvalidRequest>(&read)) FAIL(line << ": " << rejected->error.what());
   return std::get<RpcRequest>(std::move(read));
 }
 
@@ -101,12 +101,12 @@ TEST_CASE("a line that is not a valid request is rejected with the reason, and w
   for (const auto& [line, code, reason, has_id] : table) {
     INFO(line.substr(0, 200));
     const auto read = parse_request(line);
-    const auto* refused = std::get_if<InvalidRequest>(&read);
-    REQUIRE(refused);
-    CHECK(refused->error.code() == code);
-    INFO(refused->error.what());
-    CHECK(std::string(refused->error.what()).find(reason) != std::string::npos);
-    CHECK(refused->id == (has_id ? Json(5) : Json(nullptr)));
+    const auto* rejected = std::get_if<InvalidRequest>(&read);
+    REQUIRE(rejected);
+    CHECK(rejected->error.code() == code);
+    INFO(rejected->error.what());
+    CHECK(std::string(rejected->error.what()).find(reason) != std::string::npos);
+    CHECK(rejected->id == (has_id ? Json(5) : Json(nullptr)));
   }
 }
 

@@ -93,7 +93,7 @@ struct Rig : VirtualRuntime {
   std::filesystem::path file(const std::string& name, const std::string& text) {
     return files.write(name, text);
   }
-  /// Returns true if the last tick used the rendering that was handed over, unchanged.
+  /// Returns true if the last tick used the submitted rendering, unchanged.
   bool rendering_intact() { return last.rendering_checksum == reconfigurator().current_rendering().checksum; }
 
  private:

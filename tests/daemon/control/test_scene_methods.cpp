@@ -32,7 +32,7 @@ struct Rig {
     return MethodTable::run(table.look_up(request, role), params, {}).result;
   }
   /// Returns the error that the request is answered with.
-  RpcError refused(const std::string& method, const Json& params, Role role = Role::administrator) const {
+  RpcError rejected(const std::string& method, const Json& params, Role role = Role::administrator) const {
     try {
       const Json result = ask(method, params, role);
       FAIL(method << " takes " << params.dump() << " and answers " << result.dump());
@@ -82,7 +82,7 @@ TEST_CASE("scene.load finds the file on the search path and replaces the whole s
   CHECK(a.ask("scene.load",
               {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering_id"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
-  const RpcError none = a.refused("scene.load", {{"file", "scenes/no_such.toml"}});
+  const RpcError none = a.rejected("scene.load", {{"file", "scenes/no_such.toml"}});
   CHECK(none.code() == RpcCode::rejected);
   has(none, "scenes/no_such.toml");
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
@@ -105,7 +105,7 @@ TEST_CASE("an invalid change is rejected with its location, and nothing changes"
   const auto add = [&](const char* key, const Json& value) {
     Json block = a_block();
     block[key] = value;
-    const RpcError error = a.refused("scene.add", {{"obstacle", block}});
+    const RpcError error = a.rejected("scene.add", {{"obstacle", block}});
     CHECK(error.code() == RpcCode::rejected);
     return error;
   };
@@ -116,14 +116,14 @@ TEST_CASE("an invalid change is rejected with its location, and nothing changes"
   has(add("name", "table"), "already");
   Json null = a_block();
   null["scale"] = nullptr;
-  CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::invalid_params);
-  has(a.refused("scene.remove", {{"name", "tabel"}}), "'tabel'");
-  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"duration_s", 1.0}}),
+  CHECK(a.rejected("scene.add", {{"obstacle", null}}).code() == RpcCode::invalid_params);
+  has(a.rejected("scene.remove", {{"name", "tabel"}}), "'tabel'");
+  has(a.rejected("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"duration_s", 1.0}}),
       "half_space");
-  CHECK(a.refused("scene.move", {{"name", "table"}, {"duration_s", 1.0}}).code() == RpcCode::invalid_params);
-  has(a.refused("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
-  has(a.refused("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
-  has(a.refused("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
+  CHECK(a.rejected("scene.move", {{"name", "table"}, {"duration_s", 1.0}}).code() == RpcCode::invalid_params);
+  has(a.rejected("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
+  has(a.rejected("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
+  has(a.rejected("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
       "exact");
   CHECK(a.ask("scene.get") == before);
 }
@@ -132,7 +132,7 @@ TEST_CASE("workspace.set applies all values or none", "[scene_methods]") {
   const Rig a;
   const Json unchanged = a.ask("workspace.set");
   CHECK(unchanged == Json({{"scale", 1.0}, {"clutched", false}}));
-  const RpcError error = a.refused("workspace.set", {{"scale", 100.0}, {"clutched", true}});
+  const RpcError error = a.rejected("workspace.set", {{"scale", 100.0}, {"clutched", true}});
   CHECK(error.code() == RpcCode::rejected);
   has(error, "0.1 to 10");
   CHECK(a.ask("workspace.set") == unchanged);
@@ -153,7 +153,7 @@ TEST_CASE("a local model requires its kind, its parameters and a lifetime", "[sc
       other.erase(key);
     else
       other[key] = value;
-    return a.refused("model.set", other);
+    return a.rejected("model.set", other);
   };
   has(with("kind", "plan"), "plane, spring, damping");
   has(with("normal", nullptr), "'normal'");
@@ -170,9 +170,9 @@ TEST_CASE("an observer can change nothing, and only an administrator can reload"
   for (const auto& [name, row] : a.table.methods()) {
     if (row.min_role == Role::observer) continue;
     INFO(name);
-    CHECK(a.refused(name, Json::object(), Role::observer).code() == RpcCode::permission_denied);
+    CHECK(a.rejected(name, Json::object(), Role::observer).code() == RpcCode::permission_denied);
   }
-  CHECK(a.refused("reload", Json::object(), Role::operator_).code() == RpcCode::permission_denied);
+  CHECK(a.rejected("reload", Json::object(), Role::operator_).code() == RpcCode::permission_denied);
   CHECK(a.reloads == 0);
   const Json answer = a.ask("reload");
   CHECK(a.reloads == 1);

@@ -222,7 +222,7 @@ TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "
   }
   std::ifstream in(file, std::ios::binary);
   const std::string good{std::istreambuf_iterator<char>(in), {}};
-  int refused = 0;
+  int rejected = 0;
   for (int i = 0; i < 400; ++i) {
     std::string bytes = good;
     for (std::uint64_t k = 0; k <= random.bits() % 8; ++k)
@@ -233,11 +233,11 @@ TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "
       for (std::size_t row = 0; row < recording.ticks.size(); ++row)
         REQUIRE(recording.contacts_of(row).size() <= recording.contacts.size());
     } catch (const RecordingError& error) {
-      ++refused;
+      ++rejected;
       REQUIRE(std::string(error.what()).find(mutant.string()) == 0);
     }
   }
-  CHECK(refused > 20);
+  CHECK(rejected > 20);
 }
 
 TEST_CASE("recordings are rejected with the file and the remedy", "[recording]") {

@@ -264,7 +264,7 @@ TEST_CASE("the gains of the models are added up while they act, and are gone wit
   CHECK_FALSE(models.evaluate({}, {}, TimePoint{}, kTick_s, 1.0).any_active);
 }
 
-TEST_CASE("a model that changes reaches its new values to 2 % within the fade, whichever of them changes",
+TEST_CASE("a model that changes reaches its new values to 2 % within the fade, for each of its values",
           "[models]") {
   LocalModel old;
   old.kind = LocalModel::Kind::spring;

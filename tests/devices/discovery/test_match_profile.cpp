@@ -35,7 +35,7 @@ DeviceIdentity identity(int vendor, int product, std::uint16_t page = 0x01, std:
 std::string matched(const DeviceIdentity& device, std::string_view named = {}) {
   const MatchResult result = match_profile(device, kProfiles, named);
   REQUIRE(result.rejections.size() == kProfiles.size());
-  return result.profile ? kProfiles[*result.profile].name : result.refusal;
+  return result.profile ? kProfiles[*result.profile].name : result.rejection;
 }
 
 std::string why_not(const DeviceIdentity& device, const std::string& profile) {
@@ -94,7 +94,7 @@ TEST_CASE("every profile that does not match has a reason", "[match_profile]") {
   const DeviceIdentity stranger = identity(0x1d50, 0x6018);
   const MatchResult result = match_profile(stranger, kProfiles);
   CHECK_FALSE(result.profile);
-  CHECK(result.refusal.empty());
+  CHECK(result.rejection.empty());
   for (const std::string& why : result.rejections) CHECK_FALSE(why.empty());
   CHECK(why_not(stranger, "falcon") == "its ids do not include 1d50:6018");
   CHECK(why_not(stranger, "loopback") == "it is for the simulated device");
@@ -176,5 +176,5 @@ TEST_CASE("two equal devices are distinguished by serial number", "[match_profil
 
   const std::vector<DeviceProfile> same = {any, any};
   CHECK_FALSE(match_profile(device, same).profile);
-  CHECK_THAT(match_profile(device, same).refusal, Contains("several profiles match 1209:0007"));
+  CHECK_THAT(match_profile(device, same).rejection, Contains("several profiles match 1209:0007"));
 }

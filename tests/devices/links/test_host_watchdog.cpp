@@ -46,7 +46,7 @@ struct FedWatchdog {
   FedWatchdog(const DeviceProfile& of, const WrenchReport& report) : profile(of), watchdog(profile, kAfter) {
     watchdog.feed(kStart, packet_of(profile, report));
   }
-  bool speaks(TimePoint now) { return watchdog.send_zero(now, packet); }
+  bool sends_zero(TimePoint now) { return watchdog.send_zero(now, packet); }
   WrenchReport spoken() const { return decode(profile.wrench_report, packet.report()).report; }
 };
 
@@ -54,11 +54,11 @@ TEST_CASE("if the loop hangs after a nonzero wrench, the watchdog sends zero wit
           "[host_watchdog]") {
   FedWatchdog fed(shipped("loopback"), push(65534));
   CHECK(fed.watchdog.due() == kStart + kAfter);
-  CHECK_FALSE(fed.speaks(kStart + kAfter - 1ns));
+  CHECK_FALSE(fed.sends_zero(kStart + kAfter - 1ns));
   TimePoint now = kStart + kAfter;
   for (unsigned n = 1; n <= HostWatchdog::kZeroReports; ++n, now += HostWatchdog::kZeroInterval) {
     REQUIRE(fed.watchdog.due() == now);
-    REQUIRE(fed.speaks(now));
+    REQUIRE(fed.sends_zero(now));
     const WrenchReport report = fed.spoken();
     CHECK(report.F.force_N.isZero(0.0));
     CHECK(report.F.torque_Nm.isZero(0.0));
@@ -68,7 +68,7 @@ TEST_CASE("if the loop hangs after a nonzero wrench, the watchdog sends zero wit
     CHECK(decode(fed.profile.wrench_report, fed.packet.report()).outcome == Decoding::ok);
   }
   CHECK(fed.watchdog.due() == TimePoint::max());
-  CHECK_FALSE(fed.speaks(now + 1h));
+  CHECK_FALSE(fed.sends_zero(now + 1h));
 }
 
 TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
@@ -76,14 +76,14 @@ TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
   TimePoint now = kStart;
   for (std::uint64_t n = 2; n < 100; ++n) {
     now += 1ms;
-    CHECK_FALSE(fed.speaks(now));
+    CHECK_FALSE(fed.sends_zero(now));
     fed.watchdog.feed(now, packet_of(fed.profile, push(n)));
   }
-  CHECK(fed.speaks(now + kAfter));
+  CHECK(fed.sends_zero(now + kAfter));
   // After the loop resumes, the watchdog is armed again.
   fed.watchdog.feed(now + 1s, packet_of(fed.profile, push(7)));
-  CHECK_FALSE(fed.speaks(now + 1s));
-  REQUIRE(fed.speaks(now + 1s + kAfter));
+  CHECK_FALSE(fed.sends_zero(now + 1s));
+  REQUIRE(fed.sends_zero(now + 1s + kAfter));
   CHECK(fed.spoken().sequence == 8);
 }
 
@@ -110,7 +110,7 @@ TEST_CASE("a report that is no wrench does not change the watchdog's state", "[h
   other.bytes[0] = 0x7f;
   fed.watchdog.feed(kStart + 5ms, other);
   CHECK(fed.watchdog.due() == kStart + kAfter);
-  CHECK(fed.speaks(kStart + kAfter));
+  CHECK(fed.sends_zero(kStart + kAfter));
 }
 
 TEST_CASE("the watchdog sends zero efforts to a device with motor efforts", "[host_watchdog]") {
@@ -119,7 +119,7 @@ TEST_CASE("the watchdog sends zero efforts to a device with motor efforts", "[ho
   WrenchReport report;
   report.efforts = {0.0, 0.3, 0.0};
   FedWatchdog fed(polhem, report);
-  REQUIRE(fed.speaks(kStart + kAfter));
+  REQUIRE(fed.sends_zero(kStart + kAfter));
   for (const double effort : fed.spoken().efforts) CHECK(effort == 0.0);
   report.efforts = {};
   CHECK(FedWatchdog(polhem, report).watchdog.due() == TimePoint::max());
@@ -132,7 +132,7 @@ TEST_CASE("the watchdog does not allocate or lock", "[host_watchdog]") {
   {
     const test::RealtimeGuard guard;
     fed.watchdog.feed(kStart, packet);
-    fed.speaks(kStart + kAfter);
+    fed.sends_zero(kStart + kAfter);
     allocations = guard.allocations(), locks = guard.locks();
   }
   CHECK(allocations == 0);

@@ -78,7 +78,7 @@ struct Session {
     for (const TimePoint end = clock.now() + time; clock.now() < end; each()) step();
   }
   /// Runs until the device sends poses and the hand rests.
-  void settle() {
+  void run_until_still() {
     open();
     run(2s);
     REQUIRE(sample.homed);
@@ -164,18 +164,18 @@ TEST_CASE("the pose follows the motion of the hand, for every shipped profile", 
       REQUIRE(s.sample.fault == Fault::none);
       if (!s.sample.fresh) return;
       const Pose& truth = s.link->device().X_BH();
-      const Pose& told = s.sample.X_BH;
+      const Pose& reported = s.sample.X_BH;
       const Resolution resolution = resolution_at(profile, truth);
       const Pose expected = on_counts(profile, truth);
-      INFO((told.translation_m - truth.translation_m).transpose()
+      INFO((reported.translation_m - truth.translation_m).transpose()
            << " m, at " << seconds(s.clock.now().time_since_epoch()));
-      REQUIRE(apart_m(told, expected) <= resolution_of_fields(profile).m);
-      REQUIRE(apart_rad(told, expected) <= resolution_of_fields(profile).rad);
-      REQUIRE(apart_m(told, truth) <= resolution.m);
-      REQUIRE(apart_rad(told, truth) <= resolution.rad);
+      REQUIRE(apart_m(reported, expected) <= resolution_of_fields(profile).m);
+      REQUIRE(apart_rad(reported, expected) <= resolution_of_fields(profile).rad);
+      REQUIRE(apart_m(reported, truth) <= resolution.m);
+      REQUIRE(apart_rad(reported, truth) <= resolution.rad);
       ++compared;
-      least_x = std::min(least_x, told.translation_m.x());
-      most_x = std::max(most_x, told.translation_m.x());
+      least_x = std::min(least_x, reported.translation_m.x());
+      most_x = std::max(most_x, reported.translation_m.x());
     });
     // A Falcon sends no valid pose before it is homed.
     CHECK(compared >= 5.3 / seconds(s.period));
@@ -194,26 +194,26 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
     INFO(profile.name);
     const SimulationSettings settings = still();
     Session s(profile, settings);
-    s.settle();
+    s.run_until_still();
     const Pose before = s.link->device().X_BH();
     for (int i = 0; i < std::lround(1.0 / seconds(s.period)); ++i) {
       s.step(F, true);
       REQUIRE(s.written == Fault::none);
     }
     const DofMask driven = driven_dofs(profile);
-    const Wrench felt = s.link->device().motor_wrench();
+    const Wrench motor_wrench = s.link->device().motor_wrench();
     const Vector3d moved = s.link->device().X_BH().translation_m - before.translation_m;
     if (driven == kNoDof) {
-      CHECK(felt.force_N.isZero());
+      CHECK(motor_wrench.force_N.isZero());
       CHECK(s.sample.dropped_dofs == kAllDofs);
       continue;
     }
     // Efforts are counts too: 1 mA, or one of 4096.
     const double resolution_N = driven == kAllDofs ? 1e-3 : 0.02;
-    CHECK((felt.force_N - F.force_N).norm() < resolution_N);
+    CHECK((motor_wrench.force_N - F.force_N).norm() < resolution_N);
     CHECK((moved - F.force_N / settings.hand_stiffness_N_per_m).norm() <
           resolution_N / settings.hand_stiffness_N_per_m + 1e-6);
-    if (driven == kAllDofs) CHECK((felt.torque_Nm - F.torque_Nm).norm() < 1e-5);
+    if (driven == kAllDofs) CHECK((motor_wrench.torque_Nm - F.torque_Nm).norm() < 1e-5);
   }
 }
 
@@ -227,7 +227,7 @@ TEST_CASE("a rendered wall stops the hand, for every shipped profile with motors
                                          {3.0, {0.0, 0.0, kWallAt_m - kDeep_m}, {0, 0, 0}}});
     settings.report_delay_s = settings.command_delay_s = 0.0002;
     Session s(profile, settings);
-    s.settle();
+    s.run_until_still();
     Wrench F;
     for (int i = 0; i < std::lround(3.0 / seconds(s.period)); ++i) {
       s.step(F, true);
@@ -247,7 +247,7 @@ TEST_CASE("if the host hangs, the device's watchdog releases the hand", "[simula
     if (driven_dofs(profile) == kNoDof) continue;
     INFO(profile.name);
     Session s(profile, still());
-    s.settle();
+    s.run_until_still();
     for (int i = 0; i < 100; ++i) s.step({{0.0, 0.0, 1.0}, {0, 0, 0}}, true);
     const auto pushed = [&] { return s.link->device().motor_wrench().force_N.z(); };
     REQUIRE(pushed() > 0.9);
@@ -270,7 +270,7 @@ TEST_CASE("if the host hangs, the device's watchdog releases the hand", "[simula
 
 TEST_CASE("transport faults appear on every shipped profile as on the simulated device", "[simulation]") {
   const Kind kind = GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::corrupt, Kind::short_report,
-                             Kind::refuse_commands);
+                             Kind::reject_commands);
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name << ", fault " << static_cast<int>(kind));
     SimulationSettings settings = moving();
@@ -308,7 +308,7 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
       case Kind::short_report:
         CHECK((rejected > 25) == (report.length / 2 < least));
         break;
-      case Kind::refuse_commands:
+      case Kind::reject_commands:
         CHECK((written == Fault::write_failed) == profile.has_output);
         break;
       default:
@@ -343,7 +343,7 @@ TEST_CASE("an injected pose fault appears on devices that send a pose", "[simula
     }
     device.inject({Kind::jump, 2500ms, 100ms});
     if (tells_pose) device.inject({Kind::bad_quaternion, 2800ms, 100ms});
-    s.settle();
+    s.run_until_still();
     int teleported = 0, bad = 0;
     s.run(1s, [&] {
       teleported += s.sample.fault == Fault::pose_jumped ? 1 : 0;
@@ -358,7 +358,7 @@ TEST_CASE("an open simulated link does not allocate or lock", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, moving());
-    s.settle();
+    s.run_until_still();
     std::uint64_t allocations = 0, locks = 0;
     {
       const test::RealtimeGuard guard;
@@ -379,7 +379,7 @@ TEST_CASE("a simulated run does not depend on how calls divide the time", "[simu
     INFO(profile.name);
     const auto run = [&](Duration cut) {
       Session s(profile, moving());
-      s.settle();
+      s.run_until_still();
       std::array<std::uint8_t, kMaxReportBytes> buffer;
       for (Duration t{}; t < 1s; t += 10ms) {
         for (const TimePoint end = s.clock.now() + 10ms; s.clock.now() < end;) {
@@ -406,9 +406,9 @@ TEST_CASE("a device with its own frames is simulated in these frames", "[simulat
   });
   const Wrench F{{1.0, -0.5, 0.8}, {0.01, 0.02, -0.03}};
   for (int i = 0; i < 1000; ++i) s.step(F, true);
-  const Wrench felt = s.link->device().motor_wrench();
-  CHECK((felt.force_N - F.force_N).norm() < 1e-5);
-  CHECK((felt.torque_Nm - F.torque_Nm).norm() < 1e-5);
+  const Wrench motor_wrench = s.link->device().motor_wrench();
+  CHECK((motor_wrench.force_N - F.force_N).norm() < 1e-5);
+  CHECK((motor_wrench.torque_Nm - F.torque_Nm).norm() < 1e-5);
 }
 
 TEST_CASE("a puck at rest sends nothing, and the tool keeps its pose", "[simulation]") {
@@ -417,11 +417,11 @@ TEST_CASE("a puck at rest sends nothing, and the tool keeps its pose", "[simulat
     Session s(shipped(name), still());
     s.open();
     s.run(5s);
-    const std::uint64_t heard = s.sample.sequence;
+    const std::uint64_t sequence = s.sample.sequence;
     const Pose left = s.sample.X_BH;
     CHECK(apart_m(left, s.link->device().hand_target().X_BG) < 3e-4);
     s.run(5s);
-    CHECK(s.sample.sequence == heard);
+    CHECK(s.sample.sequence == sequence);
     CHECK(same_bits(s.sample.X_BH, left));
   }
 }
@@ -447,7 +447,7 @@ TEST_CASE("an arm has an end stop at the boundary of its workspace and returns f
                                     {3.0, {0.0, 0.0, 1.0}, {0, 0, 0}},
                                     {4.0, {0.0, 0.0, 1.0}, {0, 0, 0}},
                                     {5.0, {0.0, 0.0, 0.03}, {0, 0, 0}}}));
-    s.settle();
+    s.run_until_still();
     double highest_m = 0.0;
     s.run(2s, [&] { highest_m = std::max(highest_m, s.link->device().X_BH().translation_m.z()); });
     CHECK(highest_m > 0.04);

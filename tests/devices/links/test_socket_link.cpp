@@ -39,7 +39,7 @@ struct Pair {
     REQUIRE(send(far, report.data(), report.size(), MSG_DONTWAIT) == static_cast<ssize_t>(report.size()));
   }
   /// Returns the next report of the link's thread; empty after a timeout.
-  Bytes hear() const {
+  Bytes receive() const {
     constexpr int kPatience_ms = 2000;
     pollfd waits{far, POLLIN, 0};
     poll(&waits, 1, kPatience_ms);
@@ -89,9 +89,9 @@ TEST_CASE("a socket transfers reports in both directions and keeps their boundar
   CHECK(link.read(kNow, buffer).status == LinkStatus::not_ready);
 
   CHECK(link.write(kNow, Bytes{7, 8}) == LinkStatus::ok);
-  CHECK(pair.hear() == Bytes{7, 8});
+  CHECK(pair.receive() == Bytes{7, 8});
   CHECK(link.write(kNow, Bytes{9}) == LinkStatus::ok);
-  CHECK(pair.hear() == Bytes{9});
+  CHECK(pair.receive() == Bytes{9});
 }
 
 TEST_CASE("if the device does not read, a write fails without waiting", "[socket_link]") {
@@ -100,7 +100,7 @@ TEST_CASE("if the device does not read, a write fails without waiting", "[socket
   link.open();
   const Bytes report(32, 1);
   CHECK(written_until(link, report, LinkStatus::not_ready));
-  CHECK(pair.hear() == report);
+  CHECK(pair.receive() == report);
   CHECK(written_until(link, report, LinkStatus::ok));  // there is space again
 }
 
@@ -129,7 +129,7 @@ TEST_CASE("a closed socket link transfers nothing until it is opened again", "[s
   CHECK(pair.hear_now().empty());
   link.open();
   CHECK(link.write(kNow, Bytes{1}) == LinkStatus::ok);
-  CHECK(pair.hear() == Bytes{1});
+  CHECK(pair.receive() == Bytes{1});
 }
 
 TEST_CASE("a descriptor that is no packet socket is rejected with the remedy", "[socket_link]") {

@@ -145,10 +145,10 @@ TEST_CASE("a released puck sends three packets of zeros and the pose stays", "[e
   bench.steps(100);
   bench.emulator.set_deflection({});
   bench.steps(40);
-  const std::uint64_t heard = bench.sample.sequence;
+  const std::uint64_t sequence = bench.sample.sequence;
   const Pose left = bench.sample.X_BH;
   bench.steps(2000);
-  CHECK(bench.sample.sequence == heard);
+  CHECK(bench.sample.sequence == sequence);
   CHECK(same_bits(bench.sample.X_BH, left));
   CHECK(bench.sample.fault == Fault::none);
 }
@@ -253,10 +253,10 @@ TEST_CASE("a force on a Polhem gives the currents of the manufacturer's formulas
 TEST_CASE("a Polhem answers commands only, and wrenchd sends the first one", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
-  struct Nobody final : ReportSink {
+  struct NullSink final : ReportSink {
     void take_report(TimePoint, std::span<const std::uint8_t>) noexcept override {}
-  } nobody;
-  bench.emulator.advance_to(bench.clock.now(), nobody);  // its first report, at power-on, is lost
+  } sink;
+  bench.emulator.advance_to(bench.clock.now(), sink);  // its first report, at power-on, is lost
   bench.pass(5s);
   CHECK(bench.emulator.reports_sent() == 1);
   bench.open();  // the first read sends zeros

@@ -27,9 +27,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Answer = std::pair<int, int>;  ///< what the ioctl returns, and errno where that is -1
+using Answer = std::pair<int, int>;  ///< result of the ioctl, and errno if it is -1
 
-/// What answers ioctls: GLib's object system wants a class for it, and this is one for all.
+/// GLib class that answers all ioctls.
 class IoctlHandler {
  public:
   virtual ~IoctlHandler() = default;
@@ -75,7 +75,7 @@ void attach(UMockdevTestbed* testbed, const std::string& node, IoctlHandler* han
     throw std::runtime_error("umockdev: " + std::string(error->message));
 }
 
-/// The bytes at an ioctl's argument, `length` of them; valid until the ioctl ends.
+/// Returns `length` bytes of an ioctl's argument; valid until the ioctl ends.
 std::uint8_t* bytes_at(UMockdevIoctlData* argument, std::size_t offset, std::size_t length) {
   UMockdevIoctlData* const data = umockdev_ioctl_data_resolve(argument, offset, length, nullptr);
   if (data == nullptr) throw std::runtime_error("umockdev: an ioctl without its argument");
@@ -109,7 +109,8 @@ std::string add(UMockdevTestbed* testbed, const char* subsystem, const std::stri
   return result;
 }
 
-/// A device and all below it. umockdev leaves the links to those below, and minds them when they come again.
+/// Removes a device and its children. umockdev leaves the links of the children, which are errors when the
+/// children are added again.
 void remove(UMockdevTestbed* testbed, const std::string& path, std::vector<std::string> of) {
   umockdev_testbed_remove_device(testbed, path.c_str());
   gchar* const root = umockdev_testbed_get_root_dir(testbed);
@@ -201,7 +202,7 @@ Bytes report_descriptor(bool numbered) {
 
 // --- hidraw -----------------------------------------------------------------------------------------------
 
-/// hidraw's ioctls, as far as hidapi asks.
+/// The hidraw ioctls that hidapi uses.
 struct MockHidraw::Ioctls final : IoctlHandler {
   explicit Ioctls(Bytes of) : descriptor(std::move(of)) {}
 
@@ -228,6 +229,9 @@ MockHidraw::MockHidraw(MockMachine& machine, MockIdentity identity)
       ioctls_(std::make_unique<Ioctls>(report_descriptor(identity_.numbered_reports))) {
   UMockdevTestbed* const testbed = machine_.testbed();
   const std::string number = std::to_string(identity_.number);
+  // Before the device is listed: a program that opens the node while umockdev's socket is bound but does not
+  // listen yet is ended by umockdev's preloaded library.
+  attach(testbed, node(), ioctls_.get());
   usb_path_ = add_usb(testbed, identity_);
   const std::string interface = add_interface(testbed, identity_, usb_path_);
   const std::string hid_name = "0003:" + identity_.vendor + ":" + identity_.product + ".000" + number;
@@ -251,7 +255,6 @@ MockHidraw::MockHidraw(MockMachine& machine, MockIdentity identity)
   cfmakeraw(&raw);
   tcsetattr(slave_, TCSANOW, &raw);
   fs::create_symlink(slave, node_in(testbed, node()));
-  attach(testbed, node(), ioctls_.get());
 }
 
 MockHidraw::~MockHidraw() {
@@ -268,8 +271,7 @@ void MockHidraw::send(const Bytes& report) {
 }
 
 bool MockHidraw::report_waits() const {
-  pollfd waiting{slave_, POLLIN,
-                 0};  // poll() also delivers the bytes that are still on their way to the node
+  pollfd waiting{slave_, POLLIN, 0};  // poll() also delivers pending bytes to the node
   return poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0;
 }
 
@@ -303,8 +305,8 @@ void MockHidraw::unplug() {
 
 // --- usbfs ------------------------------------------------------------------------------------------------
 
-/// usbfs's ioctls, as far as libusb asks. What a finished transfer looks like to poll() is a FIFO that is
-/// kept full and has room only while one waits to be reaped.
+/// The usbfs ioctls that libusb uses. A FIFO reports finished transfers to poll(): it is full, and has room
+/// only while a finished transfer waits for its reap ioctl.
 struct MockUsb::Ioctls final : IoctlHandler {
   struct Urb {
     UMockdevIoctlData* urb = nullptr;
@@ -379,7 +381,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
     return {0, 0};
   }
 
-  /// The strings of the device, which is all that is asked for.
+  /// Returns the strings of the device; libusb requests no other descriptors.
   int control(std::uint8_t* setup) const {
     if (setup[0] != 0x80 || setup[1] != 6 || setup[3] != 3) return -EPIPE;
     Bytes text{4, 3, 0x09, 0x04};
@@ -407,7 +409,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   }
 
   void drain() {
-    for (; !deaf && !out.empty(); out.pop_front()) {
+    for (; !blocked && !out.empty(); out.pop_front()) {
       const std::uint8_t* data = out.front().buffer->data;
       int length = out.front().head().buffer_length;
       if (out.front().head().type == USBDEVFS_URB_TYPE_CONTROL) {
@@ -468,7 +470,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   std::deque<Urb> in, out, finished;
   std::deque<Bytes> reports, received;
   std::pair<int, int> set_report{-1, -1};
-  bool halted = false, deaf = false, gone = false, claimed = false, kernel_driver = true;
+  bool halted = false, blocked = false, gone = false, claimed = false, kernel_driver = true;
   int halts_cleared = 0;
 };
 
@@ -476,6 +478,7 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
     : machine_(machine), identity_(std::move(identity)), ioctls_(std::make_unique<Ioctls>()) {
   UMockdevTestbed* const testbed = machine_.testbed();
   ioctls_->serial = identity_.serial;
+  attach(testbed, usb_node_of(identity_), ioctls_.get());  // before the device is listed, as for hidraw
   usb_path_ = add_usb(testbed, identity_);
   interface_path_ = add_interface(testbed, identity_, usb_path_);
   const auto id = [](const std::string& hex) { return std::stoul(hex, nullptr, 16); };
@@ -503,7 +506,6 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
   ioctls_->fifo = open(node.c_str(), O_RDWR | O_NONBLOCK);
   fcntl(ioctls_->fifo, F_SETPIPE_SZ, 4096);
   ioctls_->fill();
-  attach(testbed, usb_node_of(identity_), ioctls_.get());
 }
 
 MockUsb::~MockUsb() {
@@ -534,9 +536,9 @@ Bytes MockUsb::receive() {
   return report;
 }
 
-void MockUsb::set_deaf(bool deaf) {
+void MockUsb::set_blocked(bool blocked) {
   const std::lock_guard lock(ioctls_->mutex);
-  ioctls_->deaf = deaf;
+  ioctls_->blocked = blocked;
   ioctls_->drain();
 }
 

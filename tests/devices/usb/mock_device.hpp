@@ -10,15 +10,15 @@
 #include <utility>
 #include <vector>
 
-// GLib's and umockdev's, whose headers stay out of the tests.
+// Types of GLib and umockdev; the tests do not include their headers.
 typedef struct _UMockdevTestbed UMockdevTestbed;
 
 namespace wrenchd::test {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A /sys and /dev of the test's own, for libudev, hidapi and libusb in this process (umockdev). Needs the
-/// program to run under umockdev-wrapper; throws where it does not.
+/// A mocked /sys and /dev for libudev, hidapi and libusb in this process (umockdev). Throws if the program
+/// does not run under umockdev-wrapper.
 class MockMachine {
  public:
   MockMachine();
@@ -32,24 +32,24 @@ class MockMachine {
   UMockdevTestbed* testbed_;
 };
 
-/// What a mock device says of itself.
+/// Identity of a mock device.
 struct MockIdentity {
   std::string place = "1-1";
-  int number = 0;  ///< of hidraw node and USB address
+  int number = 0;  ///< number of the hidraw node, and USB address
   std::string serial = "A1";
   std::string vendor = "1209";
   std::string product = "6d0f";
   bool numbered_reports = true;
-  bool hid = true;  ///< otherwise a vendor's own interface with bulk endpoints
+  bool hid = true;  ///< false: a vendor-defined interface with bulk endpoints
   bool out_endpoint = true;
 };
 
-/// 64 bytes in, 32 out, on a vendor page; with report ids as in devices/README.md, or without.
+/// Returns a descriptor with input reports of 64 bytes and output reports of 32 bytes on a vendor page; with
+/// the report ids of devices/README.md, or without.
 Bytes report_descriptor(bool numbered);
 
-/// A HID device in a MockMachine: what the kernel shows of it, and behind its hidraw node a pseudo terminal,
-/// whose far end is the device. What goes in is a stream, so the far end reads in pieces of the length it
-/// asks for.
+/// A HID device in a MockMachine: its entries in /sys and /dev, and a pseudo terminal as its hidraw node. The
+/// terminal is a byte stream, so the device must read reports by their length.
 class MockHidraw {
  public:
   MockHidraw(MockMachine& machine, MockIdentity identity);
@@ -63,11 +63,11 @@ class MockHidraw {
   void send(const Bytes& report);
   /// Returns true while the host has not read all that send() wrote.
   bool report_waits() const;
-  /// The next bytes the host wrote; waits for them.
+  /// Waits for bytes from the host and returns them.
   Bytes receive(std::size_t length);
-  /// Bytes that wait to be received.
+  /// Returns true if bytes from the host wait.
   bool anything_received() const;
-  /// Out of its socket: the node hangs up and udev is told.
+  /// Disconnects the device: closes the node and sends the udev event.
   void unplug();
 
  private:
@@ -80,7 +80,7 @@ class MockHidraw {
   std::unique_ptr<Ioctls> ioctls_;
 };
 
-/// A USB device in a MockMachine as libusb sees it: the kernel's usbfs, mocked. Endpoint 0x81 in, 0x01 out.
+/// A USB device in a MockMachine with a mocked usbfs, for libusb. Endpoint 0x81 in, 0x01 out.
 class MockUsb {
  public:
   MockUsb(MockMachine& machine, MockIdentity identity);
@@ -88,22 +88,22 @@ class MockUsb {
   MockUsb(const MockUsb&) = delete;
   MockUsb& operator=(const MockUsb&) = delete;
 
-  /// A report to the host, as soon as it waits for one.
+  /// Sends a report when the host waits for one.
   void send(const Bytes& report);
-  /// The endpoint halts: transfers of the host end with a stall until it clears it.
+  /// Halts the endpoint: transfers stall until the host clears the halt.
   void stall();
-  /// The next report the host wrote; waits for it.
+  /// Waits for a report of the host and returns it.
   Bytes receive();
-  /// From now on no report of the host's is taken, or they are again.
-  void set_deaf(bool deaf);
+  /// Selects whether the device accepts reports of the host.
+  void set_blocked(bool blocked);
   void unplug();
 
-  /// wValue and wIndex of the last SET_REPORT; what it carried is received like any report.
+  /// wValue and wIndex of the last SET_REPORT; receive() returns its report.
   std::pair<int, int> set_report() const;
   int halts_cleared() const;
-  int in_flight() const;  ///< IN transfers that wait
+  int in_flight() const;  ///< number of pending IN transfers
   bool claimed() const;
-  bool kernel_driver() const;  ///< the kernel's own driver has the interface
+  bool kernel_driver() const;  ///< true if the kernel driver is bound to the interface
 
  private:
   struct Ioctls;

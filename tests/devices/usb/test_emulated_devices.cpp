@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The emulators behind the mock kernel: what the far end of a loopback link is elsewhere is here read and
-// written by hidapi and libusb. Who speaks when is up to the test, so that nothing depends on how fast it
-// runs.
+// The emulated devices behind a mocked kernel: hidapi and libusb read and write them. The test controls the
+// order of reports and commands, so the result does not depend on the speed of the machine.
 
 #include <array>
 #include <cmath>
@@ -30,7 +29,7 @@ TimePoint now() {
   return std::chrono::steady_clock::now();
 }
 
-/// As shipped, but that nothing is said because time passes: that the machine decides.
+/// The shipped profile without time limits, because they depend on the speed of the machine.
 DeviceProfile timeless(const char* name) {
   DeviceProfile profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml",
                                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
@@ -39,7 +38,7 @@ DeviceProfile timeless(const char* name) {
   return profile;
 }
 
-/// The near and the far side of one of the two links.
+/// Host and device side of a link.
 struct Wire {
   MockMachine machine;
   std::unique_ptr<MockHidraw> hidraw;
@@ -59,7 +58,7 @@ struct Wire {
     }
   }
   void send(const Bytes& report) const { hidraw ? hidraw->send(report) : usb->send(report); }
-  /// The next report of so many bytes; hidraw wants a zero in the place of an id.
+  /// Returns the next report with this length; hidraw requires a zero in place of the id.
   Bytes receive(std::size_t length) const {
     if (usb) return usb->receive();
     Bytes bytes = hidraw->receive(length + (numbered ? 0 : 1));
@@ -80,7 +79,8 @@ struct ToHost final : ReportSink {
 
 }  // namespace
 
-TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arrive as currents", "[usb]") {
+TEST_CASE("a Polhem over the mock kernel: encoders are read as poses, forces are written as currents",
+          "[usb]") {
   const bool over_hidraw = GENERATE(true, false);
   Wire wire(over_hidraw, false);
   EmulatedPolhem board(64);
@@ -91,7 +91,7 @@ TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arr
   TimePoint t{};
   device.open();
   device.read_newest(now());
-  board.advance_to(t, host);  // what it says at power-on
+  board.advance_to(t, host);  // report at power-on
 
   DeviceSample sample;
   for (int i = 0; i < 300; ++i) {
@@ -112,16 +112,15 @@ TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arr
     for (std::size_t j = 0; j < 3; ++j)
       REQUIRE(std::abs(board.currents_mA()[j] - expected_mA[j]) <= 0.5 + 1e-6);
 
-    counts[static_cast<std::size_t>(i % 3)] += i % 5 < 3 ? 1 : -1;  // slow enough for any machine
+    counts[static_cast<std::size_t>(i % 3)] += i % 5 < 3 ? 1 : -1;  // slow enough for every machine
     board.set_encoder_counts(counts);
     board.advance_to(t += 1ms, host);
   }
   CHECK(host.sent == 301);
 }
 
-TEST_CASE(
-    "a SpaceMouse over the mock kernel: the way of the tool is velocity times time, and its LED goes off",
-    "[usb]") {
+TEST_CASE("a SpaceMouse over the mock kernel: the tool moves by velocity times time, and the LED goes off",
+          "[usb]") {
   const bool over_hidraw = GENERATE(true, false);
   const bool split = GENERATE(true, false);
   Wire wire(over_hidraw, true);
@@ -138,7 +137,7 @@ TEST_CASE(
     wire.link->wait_readable(now() + 1h);
     sample = device.read_newest(now());
     REQUIRE(sample.fault == Fault::none);
-    if (i == 3) first = sample;  // both kinds have come by then
+    if (i == 3) first = sample;  // both kinds of reports have arrived
   }
   const double time_s = seconds(sample.arrived - first.arrived);
   const Vector3d way = sample.X_BH.translation_m - first.X_BH.translation_m;

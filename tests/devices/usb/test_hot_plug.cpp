@@ -104,7 +104,7 @@ const char* const kLenient = "[servo]\nself_test_s = 0\n";
 
 }  // namespace
 
-TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unplugging", "[usb]") {
+TEST_CASE("wrenchd waits for its device and, after it is connected again, is disarmed", "[usb]") {
   const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;
@@ -112,24 +112,25 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   const std::string config = files.write("lenient.toml", kLenient).string();
   RunningProgram wrenchd("wrenchd",
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
-  REQUIRE(wrenchd.wait_for_output("no device of profile patient is connected; waiting for it"));
+  REQUIRE_RATE(load, wrenchd.wait_for_output("no device of profile patient is connected; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
-  REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
+  REQUIRE_RATE(load, wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
   REQUIRE_RATE(load, soon([&] { return handle->was_pushed(); }));  // --arm armed it
   handle->unplug();
-  REQUIRE(wrenchd.wait_for_output("device_lost: "));
+  REQUIRE_RATE(load, wrenchd.wait_for_output("device_lost: "));
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-3", .number = 4, .serial = "B2"});
-  REQUIRE(wrenchd.wait_for_output("serial B2 in 1-3, interface 0: it is not the device that was unplugged"));
+  REQUIRE_RATE(load, wrenchd.wait_for_output(
+                         "serial B2 in 1-3, interface 0: it is not the device that was unplugged"));
   CHECK(handle->commands() == 0);
   handle->unplug();
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
-  REQUIRE(
-      wrenchd.wait_for_output("the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE_RATE(load, wrenchd.wait_for_output(
+                         "the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
   REQUIRE_RATE(load, soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 
@@ -141,18 +142,18 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   REQUIRE_RATE(load, result.exit_code == 0);
 }
 
-TEST_CASE("without a profile's name wrenchd takes the one that the device has", "[usb]") {
+TEST_CASE("without a profile name wrenchd selects the profile of the device", "[usb]") {
   const MachineLoad load;
   MockMachine machine;
   const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
   RunningProgram wrenchd("wrenchd", {"--profile", "auto", "--realtime", "best_effort"});
-  CHECK(wrenchd.wait_for_output("device reference_full_speed"));
+  REQUIRE_RATE(load, wrenchd.wait_for_output("device reference_full_speed"));
   REQUIRE_RATE(load, soon([&] { return handle.commands() > 10; }));
   wrenchd.signal(SIGTERM);
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
 }
 
-TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]") {
+TEST_CASE("a device that requires calibration is not armed before it", "[usb]") {
   const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;
@@ -170,7 +171,8 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
   if (calibrated) {
     REQUIRE_RATE(load, soon([&] { return handle.was_pushed(); }));
   } else {
-    CHECK(wrenchd.wait_for_output("cannot be armed: it is not calibrated; run wrenchctl calibrate patient"));
+    REQUIRE_RATE(load, wrenchd.wait_for_output(
+                           "cannot be armed: it is not calibrated; run wrenchctl calibrate patient"));
     REQUIRE_RATE(load, soon([&] { return handle.commands() > 300; }));
     CHECK_FALSE(handle.was_pushed());
   }
@@ -180,7 +182,7 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
   REQUIRE_RATE(load, exit_code == 0);
 }
 
-TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing", "[usb]") {
+TEST_CASE("wrenchctl calibrate asks for the axes and stores nothing if it is stopped", "[usb]") {
   const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;

@@ -16,7 +16,7 @@ namespace {
 
 class Events {
  public:
-  void hear(const HotplugEvent& event) {
+  void record(const HotplugEvent& event) {
     const std::lock_guard lock(mutex_);
     events_.push_back(event);
     changed_.notify_all();
@@ -49,7 +49,7 @@ TEST_CASE("connection and disconnection are reported for the node and for the de
   const auto source = GENERATE(HotplugMonitor::Source::udev, HotplugMonitor::Source::kernel);
   MockMachine machine;
   Events events;
-  const HotplugMonitor monitor([&](const HotplugEvent& event) { events.hear(event); }, source);
+  const HotplugMonitor monitor([&](const HotplugEvent& event) { events.record(event); }, source);
   MockHidraw device(machine, {.place = "2-1.4", .number = 5});
   const HotplugEvent node = events.await(HotplugEvent::Kind::connected, "hidraw");
   CHECK(node.node == "/dev/hidraw5");
@@ -63,7 +63,7 @@ TEST_CASE("connection and disconnection are reported for the node and for the de
   CHECK(events.await(HotplugEvent::Kind::disconnected, "usb").port_path == "2-1.4");
 }
 
-TEST_CASE("a monitor ends while nothing happens", "[usb]") {
+TEST_CASE("a monitor can be stopped while no event comes", "[usb]") {
   const MockMachine machine;
   for (int i = 0; i < 20; ++i) const HotplugMonitor monitor([](const HotplugEvent&) {});
 }

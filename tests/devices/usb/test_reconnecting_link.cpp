@@ -32,7 +32,7 @@ LinkSettings patient() {
   return {.write_deadline = 1h, .close_timeout = 10s};
 }
 
-std::string refusal(ReconnectingLink& link) {
+std::string rejection(ReconnectingLink& link) {
   try {
     link.open();
   } catch (const DeviceNotFound& missing) {
@@ -48,7 +48,7 @@ std::string refusal(ReconnectingLink& link) {
 TEST_CASE("a link finds its device and is disconnected with it", "[usb]") {
   MockMachine machine;
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
-  CHECK(refusal(link) == "no device of profile reference is connected");
+  CHECK(rejection(link) == "no device of profile reference is connected");
   std::array<std::uint8_t, 64> buffer{};
   CHECK(link.read(now(), buffer).status == LinkStatus::disconnected);
   CHECK(link.write(now(), buffer) == LinkStatus::disconnected);
@@ -62,7 +62,7 @@ TEST_CASE("a link finds its device and is disconnected with it", "[usb]") {
   mock->unplug();
   while (link.read(now(), buffer).status != LinkStatus::disconnected) std::this_thread::yield();
   mock.reset();
-  CHECK_THAT(refusal(link), Contains("no device of profile reference"));
+  CHECK_THAT(rejection(link), Contains("no device of profile reference"));
 }
 
 TEST_CASE("a device in another USB port is the same device", "[usb]") {
@@ -89,7 +89,7 @@ TEST_CASE("another device in the same port is not opened, and nothing is written
   link.close();
   mock.reset();
   mock.emplace(machine, MockIdentity{.serial = "B2"});
-  CHECK_THAT(refusal(link), Contains("serial B2") && Contains("not the device that was unplugged"));
+  CHECK_THAT(rejection(link), Contains("serial B2") && Contains("not the device that was unplugged"));
   CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::disconnected);
   CHECK_FALSE(mock->anything_received());
 }
@@ -99,7 +99,7 @@ TEST_CASE("the serial number selects one of two equal devices", "[usb]") {
   MockHidraw first(machine, {.place = "1-1", .number = 0, .serial = "A1"});
   MockHidraw second(machine, {.place = "1-2", .number = 1, .serial = "B2"});
   ReconnectingLink either(profile_for(Transport::hidraw), {}, patient());
-  CHECK_THAT(refusal(either), Contains("serial number A1") && Contains("serial number B2"));
+  CHECK_THAT(rejection(either), Contains("serial number A1") && Contains("serial number B2"));
   ReconnectingLink link(profile_for(Transport::hidraw), "B2", patient());
   link.open();
   CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);

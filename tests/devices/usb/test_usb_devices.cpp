@@ -36,7 +36,7 @@ TEST_CASE("a HID device is listed with all its properties", "[usb]") {
   CHECK(describe(found[0]) == "1209:6d0f serial S 7 in 3-1.2, interface 0");
 }
 
-TEST_CASE("a device without report ids is known as one", "[usb]") {
+TEST_CASE("a device without report ids is listed as such", "[usb]") {
   MockMachine machine;
   const MockHidraw device(machine, {.numbered_reports = false});
   CHECK_FALSE(list_usb_devices().at(0).numbered_reports);
@@ -115,7 +115,7 @@ TEST_CASE("open_error() asks the system whether a node can be opened", "[usb]") 
   CHECK_THAT(open_error(device, "/dev/hidraw77"), Contains("/dev/hidraw77"));
 }
 
-TEST_CASE("bus and ports stand in the path of everything below them", "[usb]") {
+TEST_CASE("bus and ports are part of the path of all devices below them", "[usb]") {
   CHECK(port_path_in(
             "/devices/pci0000:00/0000:00:14.0/usb3/3-1/3-1.2/3-1.2:1.0/0003:1209:6D0F.0001/hidraw/hidraw0") ==
         "3-1.2");

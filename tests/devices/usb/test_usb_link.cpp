@@ -53,7 +53,7 @@ std::pair<LinkRead, Bytes> read_one(ReportLink& link) {
 
 }  // namespace
 
-TEST_CASE("libusb: several transfers wait at the device", "[usb]") {
+TEST_CASE("libusb: several read transfers are submitted at once", "[usb]") {
   Bench bench;
   while (bench.mock.in_flight() < 8) std::this_thread::yield();
   CHECK(bench.mock.claimed());
@@ -63,14 +63,14 @@ TEST_CASE("libusb: several transfers wait at the device", "[usb]") {
   CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
-TEST_CASE("libusb: the kernel's driver is detached while the link is open, and given back", "[usb]") {
+TEST_CASE("libusb: the kernel driver is detached while the link is open, then attached again", "[usb]") {
   Bench bench;
   CHECK_FALSE(bench.mock.kernel_driver());
   bench.link.close();
   CHECK(bench.mock.kernel_driver());
 }
 
-TEST_CASE("libusb: reports are read in order, short and long ones as long as they are", "[usb]") {
+TEST_CASE("libusb: reports are read in order, each with its length", "[usb]") {
   const bool hid = GENERATE(true, false);  // interrupt and bulk endpoints
   Bench bench({.hid = hid});
   for (int round = 0; round < 20; ++round)
@@ -87,7 +87,7 @@ TEST_CASE("libusb: reports are read in order, short and long ones as long as the
   CHECK(bench.link.counts().dropped == 0);
 }
 
-TEST_CASE("libusb: a host that does not read loses the newest, and it is counted", "[usb]") {
+TEST_CASE("libusb: if the host does not read, the newest reports are lost and counted", "[usb]") {
   Bench bench;
   for (int i = 0; i < 100; ++i) bench.mock.send(Bytes(64, static_cast<std::uint8_t>(i)));
   while (bench.link.counts().dropped < 36) std::this_thread::yield();
@@ -98,7 +98,7 @@ TEST_CASE("libusb: a host that does not read loses the newest, and it is counted
   CHECK(bench.link.counts().dropped == 36);
 }
 
-TEST_CASE("libusb: reports are written as they are", "[usb]") {
+TEST_CASE("libusb: reports are written unchanged", "[usb]") {
   Bench bench;
   for (std::uint8_t i = 0; i < 20; ++i) {
     CHECK(bench.link.write(now(), numbered(32, i)) == LinkStatus::ok);
@@ -106,7 +106,7 @@ TEST_CASE("libusb: reports are written as they are", "[usb]") {
   }
 }
 
-TEST_CASE("libusb: to a HID interface without an OUT endpoint reports go as SET_REPORT", "[usb]") {
+TEST_CASE("libusb: reports to a HID interface without an OUT endpoint are sent as SET_REPORT", "[usb]") {
   const bool has_ids = GENERATE(true, false);
   MockMachine machine;
   MockUsb mock(machine, {.out_endpoint = false});
@@ -119,24 +119,24 @@ TEST_CASE("libusb: to a HID interface without an OUT endpoint reports go as SET_
     CHECK(mock.receive() == numbered(32, id));
     CHECK(mock.set_report() == std::pair(0x200 + (has_ids ? id : 0), 0));  // output report, interface 0
   }
-  mock.set_deaf(true);
+  mock.set_blocked(true);
   link.write(now(), Bytes(32, 1));
   link.write(now(), Bytes(32, 0));
   std::thread closing([&] { link.close(); });
   std::this_thread::sleep_for(20ms);
-  mock.set_deaf(false);
+  mock.set_blocked(false);
   Bytes last;
   do last = mock.receive();
   while (last != Bytes(32, 0));
   closing.join();
 }
 
-TEST_CASE("libusb: a device that is not HID and has no OUT endpoint takes nothing", "[usb]") {
+TEST_CASE("libusb: a device that is not HID and has no OUT endpoint accepts no reports", "[usb]") {
   Bench bench({.hid = false, .out_endpoint = false});
   CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::not_ready);
 }
 
-TEST_CASE("libusb: what stands before each packet is taken off, and packets of nothing else are none",
+TEST_CASE("libusb: status bytes before each packet are removed, and packets without data are dropped",
           "[usb]") {
   LinkSettings settings = patient();
   settings.prefix_bytes = 2;
@@ -146,7 +146,7 @@ TEST_CASE("libusb: what stands before each packet is taken off, and packets of n
   CHECK(read_one(bench.link).second == Bytes{7, 8, 9});
 }
 
-TEST_CASE("libusb: reports are cut out of what a serial chip sends, whole, in two, two in one", "[usb]") {
+TEST_CASE("libusb: reports are assembled from the packets of a serial chip", "[usb]") {
   LinkSettings settings = patient();
   settings.prefix_bytes = 2;
   settings.frame = {4, '<', '>'};
@@ -162,7 +162,7 @@ TEST_CASE("libusb: reports are cut out of what a serial chip sends, whole, in tw
   CHECK(read_one(bench.link).second == Bytes{'<', 8, 9, '>'});
 }
 
-TEST_CASE("libusb: the endpoints that the settings name are taken, or the link is refused", "[usb]") {
+TEST_CASE("libusb: the configured endpoints are used, or the link is rejected", "[usb]") {
   MockMachine machine;
   MockUsb mock(machine, {});
   LinkSettings settings = patient();
@@ -171,34 +171,33 @@ TEST_CASE("libusb: the endpoints that the settings name are taken, or the link i
   CHECK_THROWS_WITH(link.open(), Contains("no interrupt or bulk IN endpoint"));
 }
 
-TEST_CASE("libusb: while the device takes nothing the newest report waits", "[usb]") {
+TEST_CASE("libusb: while the device accepts nothing, the newest report waits", "[usb]") {
   Bench bench;
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 2));
   bench.link.write(now(), Bytes(32, 3));
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   Bytes report;
   do report = bench.mock.receive();
   while (report != Bytes(32, 3));
   while (bench.link.slot()->written() == 0) std::this_thread::yield();
 }
 
-TEST_CASE("libusb: a report not taken by the deadline is called back, and the newest goes in its place",
-          "[usb]") {
+TEST_CASE("libusb: a report that is not accepted by its deadline is replaced by the newest", "[usb]") {
   Bench bench({}, {.write_deadline = 2ms, .close_timeout = 10s});
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   while (bench.link.slot()->failed() == 0) std::this_thread::yield();
   CHECK(bench.link.write(now(), Bytes(32, 2)) ==
         LinkStatus::not_ready);  // reports the failure of the previous write
   while (bench.link.slot()->failed() < 2) std::this_thread::yield();
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   bench.link.write(now(), Bytes(32, 3));
   CHECK(bench.mock.receive() == Bytes(32, 3));
 }
 
-TEST_CASE("libusb: the last report handed over is written before the link is closed", "[usb]") {
+TEST_CASE("libusb: the last submitted report is written before the link closes", "[usb]") {
   Bench bench;
   for (int i = 0; i < 50; ++i) bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 0));
@@ -211,29 +210,29 @@ TEST_CASE("libusb: the last report handed over is written before the link is clo
   CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::disconnected);
 }
 
-TEST_CASE("libusb: closing waits for a device that takes the last report late", "[usb]") {
+TEST_CASE("libusb: closing waits for a device that accepts the last report late", "[usb]") {
   Bench bench;
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 0));
   std::thread closing([&] { bench.link.close(); });
   std::this_thread::sleep_for(20ms);  // then it waits; otherwise the test covers less
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   Bytes last;
   do last = bench.mock.receive();
   while (last != Bytes(32, 0));
   closing.join();
 }
 
-TEST_CASE("libusb: closing does not wait for a device that takes nothing", "[usb]") {
+TEST_CASE("libusb: closing does not wait for a device that accepts nothing", "[usb]") {
   Bench bench({}, {.write_deadline = 1h, .close_timeout = 1ms});
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.close();
   CHECK_FALSE(bench.mock.claimed());
 }
 
-TEST_CASE("libusb: a halted endpoint is cleared and heard again", "[usb]") {
+TEST_CASE("libusb: a halted endpoint is cleared and read again", "[usb]") {
   Bench bench;
   for (int i = 1; i <= 3; ++i) {
     bench.mock.stall();
@@ -244,7 +243,7 @@ TEST_CASE("libusb: a halted endpoint is cleared and heard again", "[usb]") {
   CHECK(bench.link.counts().stalls >= 3);
 }
 
-TEST_CASE("libusb: an unplugged device is gone, whatever still waits", "[usb]") {
+TEST_CASE("libusb: an unplugged device is disconnected, even with pending transfers", "[usb]") {
   Bench bench;
   bench.mock.send(numbered(64, 1));
   bench.mock.unplug();
@@ -257,7 +256,7 @@ TEST_CASE("libusb: an unplugged device is gone, whatever still waits", "[usb]") 
   CHECK_THROWS_WITH(bench.link.open(), Contains("no longer connected"));
 }
 
-TEST_CASE("libusb: another device in the same place is refused, and nothing is written to it", "[usb]") {
+TEST_CASE("libusb: another device in the same port is rejected, and nothing is written to it", "[usb]") {
   MockMachine machine;
   MockIdentity identity{.serial = "MINE"};
   auto mock = std::make_unique<MockUsb>(machine, identity);
@@ -274,7 +273,7 @@ TEST_CASE("libusb: another device in the same place is refused, and nothing is w
   CHECK_FALSE(other.claimed());
 }
 
-TEST_CASE("libusb: two equal devices are each read for themselves", "[usb]") {
+TEST_CASE("libusb: two equal devices are read independently", "[usb]") {
   MockMachine machine;
   MockUsb left(machine, {.place = "1-1", .number = 0, .serial = "L"});
   MockUsb right(machine, {.place = "1-2", .number = 1, .serial = "R"});
@@ -288,13 +287,13 @@ TEST_CASE("libusb: two equal devices are each read for themselves", "[usb]") {
   CHECK(read_one(l).second == numbered(64, 1));
 }
 
-TEST_CASE("libusb: a device that is not on USB is refused with the alternative", "[usb]") {
+TEST_CASE("libusb: a device that is not on USB is rejected with the alternative", "[usb]") {
   UsbDevice device;
   device.hidraw_node = "/dev/hidraw0";
   CHECK_THROWS_WITH(UsbLink(device).open(), Contains("use hidraw"));
 }
 
-TEST_CASE("libusb: reading and handing over neither allocate nor lock", "[usb][realtime]") {
+TEST_CASE("libusb: reading and submitting neither allocate nor lock", "[usb][realtime]") {
   Bench bench;
   std::array<std::uint8_t, 64> buffer{};
   int read = 0;

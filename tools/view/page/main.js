@@ -260,7 +260,7 @@ const connection = new Connection({
     showTimes();
   },
   event({ event }) {
-    if (event.name === "arming_refused" || event.name === "reload") toast(event.text);
+    if (event.name === "arming_rejected" || event.name === "reload") toast(event.text);
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
   reply({ request, accepted, error }) {

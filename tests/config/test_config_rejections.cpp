@@ -104,7 +104,7 @@ std::string point(const std::string& time_s, const std::string& position_m) {
 
 }  // namespace
 
-TEST_CASE("bad settings are refused at their place, with the cure", "[config]") {
+TEST_CASE("invalid settings are rejected with location and remedy", "[config]") {
   const std::vector<Bad> table = {
       {"[servo]\nrate_hz = 1000", "2:1", "key 'servo.rate_hz' is not known; did you mean 'rate_Hz'?"},
       {"[servo]\nrate_kHz = 1", "2:1", "key 'servo.rate_kHz' is not known; give it in Hz as 'rate_Hz'"},
@@ -216,7 +216,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
   check_rejected(as_settings, table);
 }
 
-TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
+TEST_CASE("invalid scenes are rejected with location and remedy", "[config]") {
   const std::string plane = kTool + "[[obstacle]]\nhalf_space = ";
   const std::string mesh = kTool + "[[obstacle]]\nmesh = 'cube.off'\n";
   const std::vector<Bad> table = {
@@ -300,7 +300,7 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
   check_rejected(as_scene, table);
 }
 
-TEST_CASE("a velocity that is refused does not have its turning back refused as well", "[config]") {
+TEST_CASE("a rejected velocity is not also reported for its reversal", "[config]") {
   const TemporaryDirectory dir;
   dir.write("cube.off", "");
   const auto file = dir.write("s.toml", kTool +
@@ -311,7 +311,7 @@ TEST_CASE("a velocity that is refused does not have its turning back refused as 
   CHECK(message.find('\n') == std::string::npos);
 }
 
-TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") {
+TEST_CASE("invalid profiles are rejected with location and remedy", "[config]") {
   const auto changed = [](const std::string& from, const std::string& to) {
     return with(kProfile, from, to);
   };
@@ -360,7 +360,7 @@ TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") 
   check_rejected(as_profile, table);
 }
 
-TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config]") {
+TEST_CASE("invalid hand scripts are rejected with location and remedy", "[config]") {
   const std::string start = point("0", "[0, 0, 0]");
   const std::vector<Bad> table = {
       {"", "1:1", "key 'waypoint' is missing"},
@@ -380,28 +380,28 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
   check_rejected(as_hand_script, table);
 }
 
-TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {
+TEST_CASE("all defects of a file are reported together, in file order", "[config]") {
   const TemporaryDirectory dir;
   const auto file = dir.write("w.toml", "[servo]\nrate_Hz = 1\nprioriti = 3\n[limits]\nsoft_start_s = 9\n");
   try {
     as_settings(file);
     FAIL("it loaded");
   } catch (const ConfigError& error) {
-    REQUIRE(error.refusals().size() == 3);
-    CHECK(error.refusals()[0].location.line == 2);
-    CHECK(error.refusals()[1].location.line == 3);
-    CHECK(error.refusals()[2].location.line == 5);
+    REQUIRE(error.rejections().size() == 3);
+    CHECK(error.rejections()[0].location.line == 2);
+    CHECK(error.rejections()[1].location.line == 3);
+    CHECK(error.rejections()[2].location.line == 5);
   }
 }
 
-TEST_CASE("a misspelt mandatory key is told once", "[config]") {
+TEST_CASE("a misspelt mandatory key is reported once", "[config]") {
   const TemporaryDirectory dir;
   const auto file = dir.write("p.toml", with(kProfile, "max_force_N = 10.0", "max_force_mN = 10000"));
   const std::string message = rejection_text(as_profile, file);
   CHECK(message.find('\n') == std::string::npos);
 }
 
-TEST_CASE("what is not a readable file of sensible size is refused", "[config]") {
+TEST_CASE("unreadable files and files that are too large are rejected", "[config]") {
   const TemporaryDirectory dir;
   const fs::path absent = dir.path() / "absent.toml";
   CHECK(rejection_text(as_scene, absent) == absent.string() + ": no such file; searched " + absent.string());
@@ -416,7 +416,7 @@ TEST_CASE("what is not a readable file of sensible size is refused", "[config]")
   CHECK(rejection_text(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
 }
 
-TEST_CASE("a refused hand script changes nothing", "[config]") {
+TEST_CASE("a rejected hand script changes nothing", "[config]") {
   const TemporaryDirectory dir;
   SimulationSettings s;
   CHECK_THROWS_AS(load_hand_script(dir.write("h.toml", point("0", "[0, 0, 0]") + "x = 1"), s), ConfigError);
@@ -436,7 +436,7 @@ TEST_CASE("deep nesting through many lines of dotted keys does not overflow the 
                          "deep.toml:", "is nested more than 16 deep"));
 }
 
-TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {
+TEST_CASE("mutated files load or are rejected", "[config]") {
   const std::vector<std::pair<Load, std::string>> sources = {
       {as_settings, text_of(kConfig / "wrenchd.toml")},
       {as_scene, text_of(kConfig / "scenes/cube_on_table.toml")},
@@ -448,16 +448,16 @@ TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {
   const auto below = [&](std::size_t n) {
     return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
   };
-  int refused = 0;
+  int rejected = 0;
   for (int i = 0; i < kMutants; ++i) {
     const auto& [load, source] = sources[static_cast<std::size_t>(i) % sources.size()];
     std::string text = source;
     for (std::size_t n = 1 + below(4); n > 0; --n) text[below(text.size())] = static_cast<char>(below(256));
     if (below(4) == 0) text.resize(1 + below(text.size()));
     if (below(4) == 0) text.insert(below(text.size()), text.substr(below(text.size()), below(200)));
-    refused += rejection_text(load, dir.write("mutant.toml", text)).empty() ? 0 : 1;
+    rejected += rejection_text(load, dir.write("mutant.toml", text)).empty() ? 0 : 1;
   }
-  CHECK(refused > kMutants / 4);
+  CHECK(rejected > kMutants / 4);
 }
 
 }  // namespace wrenchd
