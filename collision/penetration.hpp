@@ -43,7 +43,7 @@ class PenetrationDepth {
     /// The gap at which contacts are held open [m]. Zero yields the exact optimum. Proxy::kClearance_m yields
     /// a proxy that is admissible to the last digit. A scene of meshes always uses Proxy::kClearance_m.
     double clearance_m = 0.0;
-    FrictionSettings friction = {};  ///< friction of a followed proxy; method exact only
+    FrictionSettings friction = {};    ///< friction of a followed proxy; method exact only
     Proxy::WorkLimit work_limit = {};  ///< work limit of one tick of a followed proxy
   };
 

@@ -79,7 +79,8 @@ class CostEstimate {
     Pose X_WP = X_WQ;
     for (int i = 0; i < kSlideTicks && thread_time_s() < end_s_; ++i) {
       X_target.translation_m += kTick_s * kSpeed_m_per_s * (i < kSlideTicks / 2 ? 0.5 : -0.5) * slide_W;
-      X_target.rotation = X_target.rotation * rotation_from(kTick_s * 0.5 * kTurn_rad_per_s * Vector3d::UnitX());
+      X_target.rotation =
+          X_target.rotation * rotation_from(kTick_s * 0.5 * kTurn_rad_per_s * Vector3d::UnitX());
       X_WP = moved_towards(X_WP, X_target, kTick_s * kSpeed_m_per_s, kTick_s * kTurn_rad_per_s);
       X_WP = moved_towards(X_WQ, X_WP, kReach_m, kReach_rad);
       const double begin_s = thread_time_s();
@@ -125,8 +126,9 @@ QueryCost estimate_query_cost(const Scene& scene, double seconds) {
 std::string text(const QueryCost& cost) {
   const auto microseconds = [](double t_s) { return std::to_string(std::lround(1e6 * t_s)) + " us"; };
   return "99 % within " + microseconds(cost.p99_s) + " and " + std::to_string(cost.p99_visits) +
-         " node visits, at most " + microseconds(cost.longest_s) + " and " + std::to_string(cost.most_visits) +
-         " (pressed and slid for " + std::to_string(cost.ticks) + " ticks, on this machine)";
+         " node visits, at most " + microseconds(cost.longest_s) + " and " +
+         std::to_string(cost.most_visits) + " (pressed and slid for " + std::to_string(cost.ticks) +
+         " ticks, on this machine)";
 }
 
 }  // namespace wrenchd

@@ -35,8 +35,7 @@ LoadedObstacle make(const MeshObstacleSettings& obstacle, double surface_toleran
     if (is_convex(mesh, hull)) loaded_obstacle.hull = std::move(hull);
   }
   for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
-  loaded_obstacle.bvh = 
-      loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh, surface_tolerance_m);
+  loaded_obstacle.bvh = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh, surface_tolerance_m);
   return loaded_obstacle;
 }
 
@@ -66,7 +65,7 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
   if (!all_convex) convex.clear();
-  auto tool_mesh = 
+  auto tool_mesh =
       loader.build_bvh(tool.mesh, BodyKind::solid, settings.tool.mesh, settings.surface_tolerance_m);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));

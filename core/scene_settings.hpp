@@ -49,8 +49,8 @@ struct SceneSettings {
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
   std::vector<MeshObstacleSettings> meshes;
-  /// Contacts may use a surface that encloses a solid and lies at most this far outside of it [m]; 0: the mesh
-  /// as loaded. Rounding of single precision may raise it (collision/meshes/mesh_simplifier.hpp).
+  /// Contacts may use a surface that encloses a solid and lies at most this far outside of it [m]; 0: the
+  /// mesh as loaded. Rounding of single precision may raise it (collision/meshes/mesh_simplifier.hpp).
   double surface_tolerance_m = 1e-6;
 };
 

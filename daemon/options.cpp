@@ -14,9 +14,10 @@ namespace wrenchd {
 namespace {
 
 void add_file_options(CLI::App& app, Options& options) {
-  app.add_option("-c,--config", options.files.config,
-                 "wrenchd.toml; wrenchd searches for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
-                 "source tree")
+  app.add_option(
+         "-c,--config", options.files.config,
+         "wrenchd.toml; wrenchd searches for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
+         "source tree")
       ->capture_default_str()
       ->check(not_empty());
   app.add_option("--scene", options.files.scene, "scene file; replaces the scene of the configuration")

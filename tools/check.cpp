@@ -48,7 +48,8 @@ std::string cost_text(const Scene& scene, double rate_Hz) {
   text << "  contact queries: " << wrenchd::text(cost) << '\n';
   if (cost.p99_s > kShareOfTick / rate_Hz)
     text << "  remark: a tick of " << std::lround(1e6 / rate_Hz)
-         << " us is too short for the meshes of this scene; lower [servo] rate_Hz, raise surface_tolerance_m in the "
+         << " us is too short for the meshes of this scene; lower [servo] rate_Hz, raise surface_tolerance_m "
+            "in the "
             "scene, or use coarser meshes\n";
   return text.str();
 }

@@ -46,7 +46,10 @@ class PlaneFit {
 class RegionGrowth {
  public:
   RegionGrowth(const HalfEdgeMesh& mesh, double tolerance_m)
-      : mesh_(mesh), tolerance_m_(tolerance_m), area_normals_(mesh.face_count()), visit_(mesh.face_count(), 0) {
+      : mesh_(mesh),
+        tolerance_m_(tolerance_m),
+        area_normals_(mesh.face_count()),
+        visit_(mesh.face_count(), 0) {
     regions_.region_of_face.assign(mesh.face_count(), kNone);
     for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
       area_normals_[f] = (corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0));

@@ -8,8 +8,8 @@
 
 namespace wrenchd {
 
-/// The flat parts of a surface. Each face belongs to one region of connected faces, whose corners lie within a
-/// tolerance of one plane. A face that no neighbour continues is a region of its own.
+/// The flat parts of a surface. Each face belongs to one region of connected faces, whose corners lie within
+/// a tolerance of one plane. A face that no neighbour continues is a region of its own.
 struct FlatRegions {
   /// The plane normal . x = offset_m with an outward unit normal. It encloses the region: no corner of the
   /// region lies above it.

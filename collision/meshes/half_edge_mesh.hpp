@@ -11,8 +11,8 @@
 
 namespace wrenchd {
 
-/// A closed triangle mesh with half-edges, whose edges can be collapsed. Half-edge 3 t + i of triangle t goes from
-/// corner i to corner i + 1. Not RT-safe: allocates.
+/// A closed triangle mesh with half-edges, whose edges can be collapsed. Half-edge 3 t + i of triangle t goes
+/// from corner i to corner i + 1. Not RT-safe: allocates.
 class HalfEdgeMesh {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
@@ -30,8 +30,8 @@ class HalfEdgeMesh {
     is_manifold_ = pair_half_edges() && find_outgoing();
   }
 
-  /// True if every edge joins two faces and the faces at every vertex form one fan. If false, only vertex_m(),
-  /// corners() and the counts may be used.
+  /// True if every edge joins two faces and the faces at every vertex form one fan. If false, only
+  /// vertex_m(), corners() and the counts may be used.
   bool is_manifold() const { return is_manifold_; }
   std::uint32_t half_edge_count() const { return static_cast<std::uint32_t>(3 * triangles_.size()); }
   bool removed(std::uint32_t face) const { return triangles_[face][0] == kNone; }

@@ -12,8 +12,8 @@
 
 namespace wrenchd {
 
-/// The surface of a body of any shape as contacts use it, and the BVH over its triangles. For a solid this may
-/// be a simplified mesh that encloses the loaded one (mesh_simplifier.hpp).
+/// The surface of a body of any shape as contacts use it, and the BVH over its triangles. For a solid this
+/// may be a simplified mesh that encloses the loaded one (mesh_simplifier.hpp).
 struct MeshBvh {
   MeshBvh() = default;  ///< empty; the mesh cache fills it through visit_members()
   explicit MeshBvh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)

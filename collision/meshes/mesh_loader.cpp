@@ -181,16 +181,17 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
   const std::string_view tolerance_bytes(reinterpret_cast<const char*>(&tolerance_m), sizeof tolerance_m);
   const std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), tolerance_bytes,
                                                    bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
-  auto bvh = std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
-    if (tolerance_m > 0.0) {
-      report_progress(file, triangles, "finding its contact surface");
-      SimplifiedMesh simplified = simplify_enclosing(mesh, tolerance_m);
-      if (simplified.mesh.triangles.size() < triangles || simplified.distance_m > 0.0)
-        return MeshBvh(std::move(simplified), mesh);
-    }
-    report_progress(file, triangles, "finding its edges and building its BVH");
-    return MeshBvh(mesh, kind);
-  }));
+  auto bvh =
+      std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
+        if (tolerance_m > 0.0) {
+          report_progress(file, triangles, "finding its contact surface");
+          SimplifiedMesh simplified = simplify_enclosing(mesh, tolerance_m);
+          if (simplified.mesh.triangles.size() < triangles || simplified.distance_m > 0.0)
+            return MeshBvh(std::move(simplified), mesh);
+        }
+        report_progress(file, triangles, "finding its edges and building its BVH");
+        return MeshBvh(mesh, kind);
+      }));
   const std::size_t used = bvh->surface.triangles().size();
   if (used < triangles || bvh->surface_tolerance_m > 0.0)
     add_once(simplifications_, file.string() + ": contacts use an enclosing surface of " +

@@ -56,8 +56,8 @@ class MeshLoader {
 
   /// Returns the surface for contacts and its BVH. mesh: the mesh of `file`, placed and scaled. A solid is
   /// simplified within surface_tolerance_m [m] (mesh_simplifier.hpp); 0: not at all.
-  std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind, const std::filesystem::path& file,
-                                           double surface_tolerance_m);
+  std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind,
+                                           const std::filesystem::path& file, double surface_tolerance_m);
 
   /// Adds a warning if the size of a mesh is implausible.
   void check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely);
@@ -92,9 +92,9 @@ class MeshLoader {
 std::string rejection_text(const std::filesystem::path& file, const PolygonSoup& soup, BodyKind kind,
                            const MeshReport& report);
 
-/// Returns how many triangles contacts use in place of a mesh, and how far outside of it they lie: "12 of 60,492
-/// triangles, at most 0.0045 um outside the mesh". triangles: number of triangles of the mesh. Not RT-safe:
-/// allocates.
+/// Returns how many triangles contacts use in place of a mesh, and how far outside of it they lie: "12 of
+/// 60,492 triangles, at most 0.0045 um outside the mesh". triangles: number of triangles of the mesh. Not
+/// RT-safe: allocates.
 std::string contact_surface_text(std::size_t used, std::size_t triangles, double distance_m);
 
 /// Returns a number with separators: "1,000,000". Not RT-safe: allocates.

@@ -29,22 +29,22 @@ constexpr std::size_t kMaxStar = kMaxValence;
 constexpr double kMinFacing = 0.05;
 /// Minimum altitude of a new triangle as a fraction of its longest side, unless its predecessors are thinner.
 constexpr double kMinAltitude = 1e-5;
-/// Because of rounding, a new vertex may lie below a plane that it should enclose by this fraction of the mesh's
-/// size in one collapse, and a face may lie below the original surface by kMaxUndercut_m.
+/// Because of rounding, a new vertex may lie below a plane that it should enclose by this fraction of the
+/// mesh's size in one collapse, and a face may lie below the original surface by kMaxUndercut_m.
 constexpr double kRounding = 2e-13;
 constexpr double kMaxUndercut_m = 2e-10;
 /// Corners of a face this close to its plane, as a fraction of the mesh's size, lie in the plane.
 constexpr double kSamePlane = 1e-12;
 /// A collapse that changes the surface by at most this is exact for contact queries [m].
 constexpr double kExact_m = 1e-12;
-/// Tolerance of flat regions, and the largest displacement of a vertex that makes them planar, as fractions of
-/// the full tolerance.
+/// Tolerance of flat regions, and the largest displacement of a vertex that makes them planar, as fractions
+/// of the full tolerance.
 constexpr double kFlatTolerance = 0.02;
 constexpr double kMaxFlattening = 0.1;
 /// Sine of the angle below which two planes do not determine a line.
 constexpr double kMinSine = 1e-3;
-/// Tolerances of the passes, as fractions of the full tolerance. Passes with small tolerances first spread the
-/// error over the whole surface.
+/// Tolerances of the passes, as fractions of the full tolerance. Passes with small tolerances first spread
+/// the error over the whole surface.
 constexpr std::array kPasses = {1e-4, 3e-3, 3e-2, 0.1, 0.3, 1.0};
 /// A pass repeats its sweeps until a sweep removes less than this fraction of the vertices.
 constexpr double kMinProgress = 0.002;
@@ -58,7 +58,7 @@ struct FaceState {
   FlatRegions::Plane plane;
   /// bounds for the signed distance of the face from the original surface, positive outside [m]
   double high_m = 0.0, low_m = 0.0;
-  double thinness = 0.0;    ///< altitude / longest side
+  double thinness = 0.0;  ///< altitude / longest side
 };
 
 double thinness(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
@@ -74,7 +74,7 @@ struct Star {
     Vector3d a, b, c;
     Vector3d normal;
     double offset_m;
-    bool survives;              ///< false for the two faces at the edge
+    bool survives;                ///< false for the two faces at the edge
     Vector3d ring_from, ring_to;  ///< its side on the ring, if it survives and has one corner at the edge
   };
   StaticVector<Face, kMaxStar> faces;
@@ -153,8 +153,8 @@ class Simplifier {
     return result;
   }
 
-  /// Moves each vertex onto the planes of its flat regions. Thus flat regions become planar, and the rounding of
-  /// their coordinates no longer tilts their triangles.
+  /// Moves each vertex onto the planes of its flat regions. Thus flat regions become planar, and the rounding
+  /// of their coordinates no longer tilts their triangles.
   void flatten(const FlatRegions& regions) {
     for (std::uint32_t f = 0; f < mesh_.face_count(); ++f)
       faces_[f].plane = regions.planes[regions.region_of_face[f]];
@@ -167,18 +167,21 @@ class Simplifier {
         if (std::find(around.begin(), around.end(), region) == around.end()) around.add(region);
       });
       const std::optional<Vector3d> z_m = displacement_onto(regions, around, mesh_.vertex_m(v));
-      if (!z_m || z_m->norm() > kMaxFlattening * tolerance_m_ || z_m->norm() <= kSamePlane * size_m_) continue;
+      if (!z_m || z_m->norm() > kMaxFlattening * tolerance_m_ || z_m->norm() <= kSamePlane * size_m_)
+        continue;
       moved_m[v] = z_m->norm();
       mesh_.move_vertex(v, mesh_.vertex_m(v) + *z_m);
     }
     for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
-      for (const std::uint32_t v : mesh_.corners(f)) faces_[f].high_m = std::max(faces_[f].high_m, moved_m[v]);
+      for (const std::uint32_t v : mesh_.corners(f))
+        faces_[f].high_m = std::max(faces_[f].high_m, moved_m[v]);
       update_face(f);
     }
   }
 
-  /// Returns the displacement of a vertex onto the planes of the regions around it. It meets the planes of the
-  /// two largest regions exactly, the third one if no other plane prevents it, and lies on or above the others.
+  /// Returns the displacement of a vertex onto the planes of the regions around it. It meets the planes of
+  /// the two largest regions exactly, the third one if no other plane prevents it, and lies on or above the
+  /// others.
   std::optional<Vector3d> displacement_onto(const FlatRegions& regions,
                                             const StaticVector<std::uint32_t, kMaxStar>& around,
                                             const Vector3d& p_m) {
@@ -193,7 +196,8 @@ class Simplifier {
     }
     const std::optional<Vector3d> z_m = displacement_onto_two_planes();
     if (z_m && z_m->norm() <= kMaxFlattening * tolerance_m_) return z_m;
-    if (problem_.solve(Vector3d::Zero(), kRounding * size_m_) != decltype(problem_)::Status::optimal) return {};
+    if (problem_.solve(Vector3d::Zero(), kRounding * size_m_) != decltype(problem_)::Status::optimal)
+      return {};
     return problem_.z();
   }
 
@@ -218,8 +222,10 @@ class Simplifier {
       }
       const double at_m = missing_m / slope;
       if (i == 2) wanted_m = at_m;
-      if (slope > 0.0) least_m = std::max(least_m, at_m);
-      else most_m = std::min(most_m, at_m);
+      if (slope > 0.0)
+        least_m = std::max(least_m, at_m);
+      else
+        most_m = std::min(most_m, at_m);
     }
     if (least_m > most_m) return {};
     return on_line_m + direction * std::clamp(wanted_m, least_m, most_m);
@@ -298,7 +304,8 @@ class Simplifier {
       const FaceState& state = faces_[f];
       const Vector3d& ring_from = mesh_.vertex_m(mesh_.to(g));
       star_.faces.add({f, mesh_.vertex_m(a), mesh_.vertex_m(b), mesh_.vertex_m(c), state.plane.normal,
-                       state.plane.offset_m, survives, ring_from, mesh_.vertex_m(mesh_.from(HalfEdgeMesh::previous(g)))});
+                       state.plane.offset_m, survives, ring_from,
+                       mesh_.vertex_m(mesh_.from(HalfEdgeMesh::previous(g)))});
       star_.mean_normal += state.plane.normal;
       star_.high_m = std::max(star_.high_m, state.high_m);
       star_.low_m = std::min(star_.low_m, state.low_m);
@@ -314,7 +321,8 @@ class Simplifier {
       if (HalfEdgeMesh::face_of(g) != face_0 && HalfEdgeMesh::face_of(g) != face_1) add(g);
       if (mesh_.to(g) == u) return;
       star_.inner_edges.add({star_.w, mesh_.vertex_m(mesh_.to(g))});
-      if (g != HalfEdgeMesh::next(h) && mesh_.to(g) != mesh_.to(HalfEdgeMesh::next(mesh_.twin(h)))) star_.ring.add(mesh_.vertex_m(mesh_.to(g)));
+      if (g != HalfEdgeMesh::next(h) && mesh_.to(g) != mesh_.to(HalfEdgeMesh::next(mesh_.twin(h))))
+        star_.ring.add(mesh_.vertex_m(mesh_.to(g)));
     });
     star_.inner_edges.add({star_.u, star_.w});
     const double length = star_.mean_normal.norm();
@@ -332,7 +340,8 @@ class Simplifier {
       const std::optional<Placement> placement = evaluate(p_m);
       if (!placement) return;
       needed_m_[h] = std::min(needed_m_[h], static_cast<float>(placement->high_m));
-      if (placement->high_m <= pass_tolerance_m_ && (!best || placement->high_m < best->high_m)) best = placement;
+      if (placement->high_m <= pass_tolerance_m_ && (!best || placement->high_m < best->high_m))
+        best = placement;
     };
     try_at(star_.u);
     if (best && best->high_m <= star_.high_m + kExact_m) return best;
@@ -366,8 +375,8 @@ class Simplifier {
     if (low_m < -kMaxUndercut_m || !new_faces_are_valid(p)) return {};
     for (const Star::Face& face : star_.faces)
       for (const Vector3d& r : star_.ring)
-        highest_m = std::max(highest_m,
-                             (face.normal.dot(r) - face.offset_m) / face.normal.dot(star_.mean_normal));
+        highest_m =
+            std::max(highest_m, (face.normal.dot(r) - face.offset_m) / face.normal.dot(star_.mean_normal));
     if (highest_m > kExact_m) highest_m = std::min(highest_m, largest_rise_m(p));
     if (highest_m > max_rise_m_) return {};
     return Placement{p, star_.high_m + highest_m, low_m};
@@ -447,7 +456,8 @@ class Simplifier {
     }
     // Every edge with an end on the ring sees another star now.
     changed_[u] = locked_[u] = sweep_;
-    mesh_.for_each_outgoing(u, [&](std::uint32_t g) { changed_[mesh_.to(g)] = locked_[mesh_.to(g)] = sweep_; });
+    mesh_.for_each_outgoing(u,
+                            [&](std::uint32_t g) { changed_[mesh_.to(g)] = locked_[mesh_.to(g)] = sweep_; });
   }
 
   double tolerance_m_;

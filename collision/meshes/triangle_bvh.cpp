@@ -15,7 +15,8 @@ namespace {
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
 /// Boxes grow by this fraction of the mesh's extent, to contain the rounding to single precision.
 constexpr double kRounding = 4e-7;
-/// Other axes than those of the mesh's frame are taken if they reduce the bounds of triangles to this fraction.
+/// Other axes than those of the mesh's frame are taken if they reduce the bounds of triangles to this
+/// fraction.
 constexpr double kWorthwhile = 0.9;
 
 /// A box in double precision, and the centroid of the surface in it.
@@ -49,7 +50,8 @@ std::uint16_t features_of(const MeshSurface::Features& features) {
 double bounds_area(const TriangleMesh& mesh, const Matrix3d& axes) {
   double sum = 0.0;
   for (const auto& [i, j, k] : mesh.triangles) {
-    const Vector3d a = axes * mesh.vertices_m[i], b = axes * mesh.vertices_m[j], c = axes * mesh.vertices_m[k];
+    const Vector3d a = axes * mesh.vertices_m[i], b = axes * mesh.vertices_m[j],
+                   c = axes * mesh.vertices_m[k];
     const Vector3d size = a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c);
     sum += size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
   }

@@ -17,8 +17,8 @@ namespace wrenchd {
 /// Boxes and triangles state whether they contain convex vertices and convex edges (mesh_surface.hpp). Two
 /// that contain none cannot meet first.
 ///
-/// The data are in a frame S of their own, which has the origin of the mesh's frame M and the axes of most of its
-/// triangles. There the bounds of long triangles are small, however the file is oriented.
+/// The data are in a frame S of their own, which has the origin of the mesh's frame M and the axes of most of
+/// its triangles. There the bounds of long triangles are small, however the file is oriented.
 ///
 /// The data are in single precision with a margin for rounding. The caller tests the remaining pairs in
 /// double precision. Immutable after construction. Construction is not RT-safe: it may take seconds.

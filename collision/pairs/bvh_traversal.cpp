@@ -72,8 +72,8 @@ BvhTraversal::BvhTraversal(simd::TraversalKernel kernel)
       moved_leaves_(simd::kMovedLeavesBytes / sizeof(CacheLine)) {}
 
 void BvhTraversal::start(const TriangleBvh& a, const TriangleBvh& b, const Sweep& sweep) noexcept {
-  const Sweep of_data = {between_data(a, b, sweep.X_BA_start), between_data(a, b, sweep.X_BA_end), sweep.reach_m,
-                         sweep.all_pairs, sweep.classify};
+  const Sweep of_data = {between_data(a, b, sweep.X_BA_start), between_data(a, b, sweep.X_BA_end),
+                         sweep.reach_m, sweep.all_pairs, sweep.classify};
   job_ = {arrays_of(a),
           arrays_of(b),
           motion_of(of_data, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),

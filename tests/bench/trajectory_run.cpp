@@ -58,7 +58,8 @@ Proxy::WorkLimit unlimited_work() {
   return {10'000, 2'000'000'000, false};
 }
 
-double pose_difference_m(const Pose& X_WA, const Pose& X_WB, const std::vector<Vector3d>& corners_m) noexcept {
+double pose_difference_m(const Pose& X_WA, const Pose& X_WB,
+                         const std::vector<Vector3d>& corners_m) noexcept {
   double largest = 0.0;
   for (const Vector3d& p : corners_m) largest = std::max(largest, (X_WA * p - X_WB * p).norm());
   return largest;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "collision/query_cost.hpp"
-
 #include <memory>
 
 #include <catch2/catch.hpp>
 
 #include "collision/meshes/make_mesh.hpp"
+#include "collision/query_cost.hpp"
 #include "tests/support/manipulation_case.hpp"
 
 using namespace wrenchd;

@@ -463,7 +463,7 @@ const std::vector<Bad> kTable = {
     {kWhole, "[closed_loop]", "[homing]\nmax_rotation_rad = 0.1\n[closed_loop]", "0.1\n[closed",
      "must be no less than travel_rad"},
     {kWhole, "[closed_loop]", "[homing]\nreference_m = [0, 0, 0]\n[closed_loop]", "reference_m",
-     "known keys here: 'reference'"},
+     "did you mean 'reference'?"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_kg = 250.0\n[closed_loop]", "250.0", "from 0 to 20 kg"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_g = 250.0\n[closed_loop]", "handle_g",
      "give it in kg as 'handle_kg'"},

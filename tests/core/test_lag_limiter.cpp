@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/lag_limiter.hpp"
-
 #include <cmath>
 
 #include <catch2/catch.hpp>
+
+#include "core/lag_limiter.hpp"
 
 using namespace wrenchd;
 

@@ -262,8 +262,8 @@ class Host {
     X_WQ_ = depth.projection.X_WQ;
     in_contact_ = depth.contacts > 0;
     Wrench F_T = options_.pid ? law_.update(depth.spring_displacement, in_contact_, dt_s)
-                                    : law_.update_damping(energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_),
-                                                          depth.spring_displacement, in_contact_, dt_s);
+                              : law_.update_damping(energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_),
+                                                    depth.spring_displacement, in_contact_, dt_s);
     const double scale = lag_limiter_.scale(depth.projection.energy,
                                             depth.projection.status == ProjectionStatus::budget_spent);
     F_T = {scale * F_T.force_N, scale * F_T.torque_Nm};

@@ -25,9 +25,9 @@ struct Prism {
 
 /// Number of parts into which the facets of a prism are divided. The divided facets stay flat.
 struct FacetParts {
-  std::uint32_t across = 1;        ///< parts of each polygon edge
-  std::uint32_t along = 1;         ///< parts of the longest outer facet along z
-  std::uint32_t along_bore = 1;    ///< parts of the longest facet of the bore along z
+  std::uint32_t across = 1;      ///< parts of each polygon edge
+  std::uint32_t along = 1;       ///< parts of the longest outer facet along z
+  std::uint32_t along_bore = 1;  ///< parts of the longest facet of the bore along z
 };
 
 /// Returns the closed, outward-oriented mesh of a prism, in metres. Not RT-safe: allocates.

@@ -658,7 +658,8 @@ TEST_CASE("wrenchctl check says what contact queries cost") {
   const Bench bench;
   const auto check = [&](std::size_t triangles) {
     const std::string mesh = "mesh = { make = \"bumpy\", triangles = " + std::to_string(triangles) + " }\n";
-    const fs::path scene = bench.dir.write("scene.toml", "surface_tolerance_m = 0.0\n[tool]\n" + mesh + "[[obstacle]]\n" + mesh);
+    const fs::path scene =
+        bench.dir.write("scene.toml", "surface_tolerance_m = 0.0\n[tool]\n" + mesh + "[[obstacle]]\n" + mesh);
     return run_program("wrenchctl", {"check", scene.string()}).out;
   };
   const std::string coarse = check(80);

@@ -72,8 +72,9 @@ void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double sc
   const std::size_t triangles = mesh.triangles.size();
   const double tolerance_m = simplification_tolerance_m(mesh, SceneSettings{}.surface_tolerance_m);
   SimplifiedMesh simplified = simplify_enclosing(std::move(mesh), tolerance_m);
-  std::printf("%-18s %s\n", "contact surface",
-              contact_surface_text(simplified.mesh.triangles.size(), triangles, simplified.distance_m).c_str());
+  std::printf(
+      "%-18s %s\n", "contact surface",
+      contact_surface_text(simplified.mesh.triangles.size(), triangles, simplified.distance_m).c_str());
   std::printf("%-18s %s\n", "contact queries", self_contact_text(std::move(simplified.mesh)).c_str());
 }
 

@@ -201,7 +201,8 @@ TEST_CASE("contacts use a simplified solid, and the loader says so", "[mesh_load
     CHECK(bvh->loaded_mesh().triangles.size() == cube.triangles.size());
     CHECK(bvh->surface_tolerance_m < 1e-9);
     for (std::uint32_t v = 0; v < 8; ++v)
-      CHECK((bvh->loaded_mesh().vertices_m[bvh->loaded_vertex(v)] - bvh->surface.vertices_m()[v]).norm() < 1e-9);
+      CHECK((bvh->loaded_mesh().vertices_m[bvh->loaded_vertex(v)] - bvh->surface.vertices_m()[v]).norm() <
+            1e-9);
     REQUIRE(said.size() == 1);
     CHECK(said[0] == file.string() + ": contacts use an enclosing surface of 12 of " +
                          with_thousands_separators(cube.triangles.size()) +

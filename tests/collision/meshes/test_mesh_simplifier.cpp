@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "collision/meshes/mesh_simplifier.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -17,6 +15,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_simplifier.hpp"
 #include "collision/meshes/mesh_surface.hpp"
 #include "core/inertia.hpp"
 
@@ -30,7 +29,9 @@ using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, CGAL::AABB_face_graph_tri
 
 constexpr double kTolerance_m = 1e-6;
 
-Kernel::Point_3 point(const Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+Kernel::Point_3 point(const Vector3d& p) {
+  return {p.x(), p.y(), p.z()};
+}
 
 Surface surface_of(const TriangleMesh& mesh) {
   Surface surface;
@@ -75,7 +76,8 @@ Comparison compare(const TriangleMesh& original, const TriangleMesh& simplified)
   Tree tree(faces(surface).begin(), faces(surface).end(), surface);
   const CGAL::Side_of_triangle_mesh<Surface, Kernel> side_of(surface);
   Comparison result;
-  for (const Vector3d& p : samples_of(simplified, std::max<std::size_t>(1, simplified.triangles.size() / 3000))) {
+  for (const Vector3d& p :
+       samples_of(simplified, std::max<std::size_t>(1, simplified.triangles.size() / 3000))) {
     const double distance_m = std::sqrt(tree.squared_distance(point(p)));
     result.farthest_m = std::max(result.farthest_m, distance_m);
     if (side_of(point(p)) == CGAL::ON_BOUNDED_SIDE) result.deepest_m = std::max(result.deepest_m, distance_m);
@@ -90,7 +92,8 @@ TEST_CASE("a cube has twelve triangles, however finely its faces are cut", "[mes
     const SimplifiedMesh cube = simplify_enclosing(fine, kTolerance_m);
     CHECK(cube.mesh.triangles.size() == 12);
     CHECK(cube.distance_m <= rounding_m);
-    CHECK(std::abs(solid_properties(cube.mesh, 1.0).volume_m3 - 1.25e-4) < 8.0 * 0.0075 * (rounding_m + 1e-15));
+    CHECK(std::abs(solid_properties(cube.mesh, 1.0).volume_m3 - 1.25e-4) <
+          8.0 * 0.0075 * (rounding_m + 1e-15));
     const Comparison measured = compare(fine, cube.mesh);
     CHECK(measured.farthest_m <= cube.distance_m + 1e-12);
     CHECK(measured.deepest_m < 1e-12);
@@ -102,7 +105,8 @@ TEST_CASE("a cube has twelve triangles, however finely its faces are cut", "[mes
 }
 
 TEST_CASE("the simplified surface encloses the solid within the stated distance", "[mesh_simplifier]") {
-  for (const std::string kind : {"peg", "hole", "gear", "dowel", "socket", "bolt", "nut", "key", "lock", "hare"}) {
+  for (const std::string kind :
+       {"peg", "hole", "gear", "dowel", "socket", "bolt", "nut", "key", "lock", "hare"}) {
     INFO(kind);
     for (const TriangleMesh& fine : {make_mesh({kind, 20000}), rounded(rotated(make_mesh({kind, 20000})))}) {
       const SimplifiedMesh simple = simplify_enclosing(fine, kTolerance_m);
@@ -115,7 +119,8 @@ TEST_CASE("the simplified surface encloses the solid within the stated distance"
       const Comparison measured = compare(fine, simple.mesh);
       CHECK(measured.farthest_m <= simple.distance_m + 1e-12);
       CHECK(measured.deepest_m < 3e-10);
-      CHECK(solid_properties(simple.mesh, 1.0).volume_m3 > solid_properties(fine, 1.0).volume_m3 * (1.0 - 1e-9));
+      CHECK(solid_properties(simple.mesh, 1.0).volume_m3 >
+            solid_properties(fine, 1.0).volume_m3 * (1.0 - 1e-9));
     }
   }
 }
@@ -142,7 +147,9 @@ TEST_CASE("vertices and triangles know where they come from", "[mesh_simplifier]
     CHECK((fine.vertices_m[simple.source_vertex[v]] - simple.mesh.vertices_m[v]).norm() < 1e-4);
   const auto normal = [](const TriangleMesh& mesh, std::size_t t) -> Vector3d {
     const auto& [a, b, c] = mesh.triangles[t];
-    return (mesh.vertices_m[b] - mesh.vertices_m[a]).cross(mesh.vertices_m[c] - mesh.vertices_m[a]).normalized();
+    return (mesh.vertices_m[b] - mesh.vertices_m[a])
+        .cross(mesh.vertices_m[c] - mesh.vertices_m[a])
+        .normalized();
   };
   for (std::size_t t = 0; t < simple.source_triangle.size(); ++t)
     CHECK(normal(simple.mesh, t).dot(normal(fine, simple.source_triangle[t])) > 0.99);
