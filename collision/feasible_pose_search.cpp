@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "collision/contact_detection.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -42,21 +44,6 @@ class Halton {
   int index_ = 0;
 };
 
-/// Returns true if p is inside a closed surface: a ray from p crosses it an odd number of times. The ray's
-/// direction is oblique, because a ray through an edge counts twice or not at all.
-bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
-  const Vector3d along(0.8626, 0.3919, 0.3199);
-  bool odd = false;
-  for (std::uint32_t t = 0; t < surface.triangles().size(); ++t) {
-    const Vector3d a = surface.corner_m(t, 0) - p, b = surface.corner_m(t, 1) - p,
-                   c = surface.corner_m(t, 2) - p;
-    const double u = along.dot(b.cross(c)), v = along.dot(c.cross(a)), w = along.dot(a.cross(b));
-    const bool through = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
-    if (through && a.dot(b.cross(c)) / (u + v + w) > 0.0) odd = !odd;
-  }
-  return odd;
-}
-
 /// The search is not bound to ticks, so its proxy needs no balanced work.
 Proxy::WorkLimit unbalanced() noexcept {
   Proxy::WorkLimit effort;
@@ -66,24 +53,19 @@ Proxy::WorkLimit unbalanced() noexcept {
 
 }  // namespace
 
-FeasiblePoseSearch::FeasiblePoseSearch(const Scene& scene)
-    : scene_(scene), half_spaces_(scene), proxy_(scene, unbalanced()) {}
+FeasiblePoseSearch::FeasiblePoseSearch(const Scene& scene, ContactBackend contacts)
+    : scene_(scene),
+      half_spaces_(scene),
+      overlap_test_(make_overlap_test(scene, contacts)),
+      proxy_(scene, unbalanced(), contacts) {}
 
-/// Two surfaces that do not intersect are apart, or one body contains the other.
 bool FeasiblePoseSearch::admissible(const Pose& X_WT, double time_s) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
   for (const MeshObstacle& obstacle : scene_.meshes()) {
     const Pose X_WO = obstacle.X_WO_at(time_s);
     const double centres_m = (X_WO * obstacle.centre_O_m - X_WT.translation_m).norm();
     if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
-    const Pose X_OT = inverse(X_WO) * X_WT;
-    if (!intersecting_pairs_.find(*scene_.tool_mesh(), *obstacle.mesh, X_OT))
-      return false;  // too many pairs for a free pose
-    if (!intersecting_pairs_.pairs().empty()) return false;
-    const MeshSurface& tool = scene_.tool_mesh()->surface;
-    const MeshSurface& solid = obstacle.mesh->surface;
-    if (inside(tool, inverse(X_OT) * solid.corner_m(0, 0))) return false;
-    if (solid.kind() == MeshSurface::Kind::solid && inside(solid, X_OT * tool.corner_m(0, 0))) return false;
+    if (overlap_test_->overlaps(obstacle, inverse(X_WO) * X_WT)) return false;
   }
   return true;
 }

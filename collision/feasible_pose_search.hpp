@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <stop_token>
 
-#include "collision/pairs/intersecting_pairs.hpp"
+#include "collision/overlap_test.hpp"
 #include "collision/proxy.hpp"
 #include "collision/scene.hpp"
+#include "core/contact_backend.hpp"
 
 namespace wrenchd {
 
@@ -20,7 +22,7 @@ namespace wrenchd {
 /// seconds deep inside a fine mesh.
 class FeasiblePoseSearch {
  public:
-  explicit FeasiblePoseSearch(const Scene& scene);
+  explicit FeasiblePoseSearch(const Scene& scene, ContactBackend contacts = ContactBackend::native);
 
   /// Returns true if the tool overlaps no obstacle at X_WT and lies outside every solid. time_s: scene time
   /// of the obstacle poses [s]. Not RT-safe: may take milliseconds.
@@ -38,7 +40,7 @@ class FeasiblePoseSearch {
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;
-  IntersectingPairs intersecting_pairs_;
+  std::unique_ptr<OverlapTest> overlap_test_;
   Proxy proxy_;
 };
 

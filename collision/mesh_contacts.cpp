@@ -8,51 +8,10 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::size_t kMaxCrossings = 512;
 /// Cost of one pair: kVisitsPerPair if it reaches the feature tests, 1 / kPairsPerVisit if the separating
 /// axes decide it.
 constexpr std::uint32_t kVisitsPerPair = 1;
 constexpr std::size_t kPairsPerVisit = 2;
-/// Tolerance beyond the border of a face or an edge, as a multiple of the clearance: far above rounding, far
-/// below the distance of neighbours.
-constexpr double kBorderTolerance = 0.01;
-/// A gap is closed if it exceeds the clearance by at most this, and a touching feature may lie this far
-/// beyond its border, both as multiples of the clearance.
-constexpr double kClosingTolerance = 0.1;
-constexpr double kTouchTolerance = 1.0;
-/// A gap at the start may be this far below zero, as a multiple of the clearance.
-constexpr double kStartTolerance = 0.5;
-/// Slope by which the features around a contact may seem to be nearer than the contact, because the straight
-/// path approximates the true one.
-constexpr double kSlopeTolerance = 1e-3;
-/// If the end pose overlaps but no crossing was found, crossings missed a feature's border narrowly. The
-/// sweep then repeats the feature tests with this tolerance, as a fraction of the path, and ignores slopes.
-constexpr double kWideBorderTolerance = 0.05;
-constexpr double kAnySlope = 2.0;
-/// Up to this rotation [rad] arc and chord differ by less than 1e-5 of the tool's size.
-constexpr double kNegligibleRotation_rad = 5e-3;
-/// Crossings with similar normals count as one within this distance, as a multiple of the path length.
-constexpr double kDuplicateDistance = 4.0;
-constexpr double kSameNormal = 0.9;  // cosine of the angle between the normals
-
-Vector3d interpolate(const Vector3d& a, const Vector3d& b, double s) noexcept {
-  return a + s * (b - a);
-}
-
-/// Returns the path fraction at which a gap has decreased to the clearance.
-double closing_time(double start_m, double end_m, double clearance_m) noexcept {
-  return std::clamp((start_m - clearance_m) / (start_m - end_m), 0.0, 1.0);
-}
-
-/// Returns the first t at which a (1 - t)^2 + 2 b t (1 - t) + c t^2 changes from positive to negative; 2 if
-/// there is none.
-double first_fall_through_zero(double a, double b, double c) noexcept {
-  const double root2 = b * b - a * c;
-  if (root2 < 0.0) return 2.0;
-  const double root = std::sqrt(root2), fall = a - b;
-  const double t = fall > 0.0 ? a / (fall + root) : (fall - root) / (fall + c - b);
-  return std::isfinite(t) ? t : 2.0;
-}
 
 /// Returns true if the projection of p on the triangle's plane lies inside the triangle, or at most beyond_m
 /// outside.
@@ -69,7 +28,6 @@ bool projects_inside(const Vector3d& p, const Vector3d& a, const Vector3d& b, co
 }  // namespace
 
 MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), candidates_(scene) {
-  crossings_.reserve(kMaxCrossings);
   remaining_pairs_.resize(BvhTraversal::kCapacity);
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -100,17 +58,17 @@ MeshContacts::SweepResult MeshContacts::sweep(const Pose& X_WT, double clearance
     return result;
   }
   update_obstacle_views(X_WT, time_s);
-  feature_margin_m_ = kBorderTolerance * clearance_m + arc_deviation_m_;
-  slope_tolerance_ = kSlopeTolerance;
+  feature_margin_m_ = sweep_tolerance::kBorder * clearance_m + arc_deviation_m_;
+  slope_tolerance_ = sweep_tolerance::kSlope;
   test_pairs(budget, result);
   if (result.overlaps && crossings_.empty()) {
-    feature_margin_m_ = kWideBorderTolerance * displacement_bound_m_;
-    slope_tolerance_ = kAnySlope;
+    feature_margin_m_ = sweep_tolerance::kWideBorder * displacement_bound_m_;
+    slope_tolerance_ = sweep_tolerance::kAnySlope;
     test_pairs(budget, result);
   }
-  select_first_contacts(result);
+  crossings_.select_first(displacement_bound_m_, scene_.tool_radius_m(), result.contacts);
   if (result.contacts.empty() && !result.overlaps &&
-      (overlap_found_ || rotation_rad_ > kNegligibleRotation_rad))
+      (overlap_found_ || rotation_rad_ > sweep_tolerance::kNegligibleRotation_rad))
     verify_end_pose(budget, result);
   return result;
 }
@@ -210,15 +168,15 @@ const MeshContacts::MovedTriangle& MeshContacts::moved_triangle(const CandidateP
 
 /// A gap that is below the clearance at the start closes if the path narrows it further.
 bool MeshContacts::closes(double start_m, double end_m) const noexcept {
-  return end_m < (1.0 - kClosingTolerance) * clearance_m_ &&
-         end_m < start_m - kClosingTolerance * clearance_m_;
+  return end_m < (1.0 - sweep_tolerance::kClosing) * clearance_m_ &&
+         end_m < start_m - sweep_tolerance::kClosing * clearance_m_;
 }
 
 /// Returns true if a plane keeps a triangle on one side at both ends of the path, and so on the whole path,
 /// by at least min_gap_m at the start.
 bool MeshContacts::plane_separates(const Heights& start_m, const Heights& end_m,
                                    double min_gap_m) const noexcept {
-  if (std::min({end_m[0], end_m[1], end_m[2]}) > (1.0 + kClosingTolerance) * clearance_m_ + min_gap_m)
+  if (std::min({end_m[0], end_m[1], end_m[2]}) > (1.0 + sweep_tolerance::kClosing) * clearance_m_ + min_gap_m)
     return std::min({start_m[0], start_m[1], start_m[2]}) >= min_gap_m;
   if (std::max({end_m[0], end_m[1], end_m[2]}) < -clearance_m_ - min_gap_m)
     return std::max({start_m[0], start_m[1], start_m[2]}) <= -min_gap_m;
@@ -266,7 +224,7 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass(
   const Vector3d& p_body = vertex_body.vertices_m()[vertex];
   const Vector3d p_end = at_end(p_body);
   double end_m = front.normal.dot(p_end) - front.offset_m;
-  if (!two_sided && end_m > (1.0 + kClosingTolerance) * clearance_m_) return {};
+  if (!two_sided && end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_) return {};
   const Vector3d p_start = at_start(p_body);
   double start_m = front.normal.dot(p_start) - front.offset_m;
   VertexPass pass;
@@ -276,14 +234,14 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass(
     start_m = -start_m;
     end_m = -end_m;
   }
-  if (end_m > (1.0 + kClosingTolerance) * clearance_m_ || start_m < -kStartTolerance * clearance_m_)
+  if (end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_ || start_m < -sweep_tolerance::kStart * clearance_m_)
     return {};
   pass.closes = closes(start_m, end_m);
   pass.path_fraction = pass.closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
   pass.p = interpolate(p_start, p_end, pass.path_fraction);
   if (!projects_inside(pass.p, face_body.corner_m(triangle, 0), face_body.corner_m(triangle, 1),
                        face_body.corner_m(triangle, 2), front.normal,
-                       pass.closes ? feature_margin_m_ : kTouchTolerance * clearance_m_))
+                       pass.closes ? feature_margin_m_ : sweep_tolerance::kTouch * clearance_m_))
     return {};
   // Any features may surround a vertex of a surface.
   if (vertex_body.kind() == MeshSurface::Kind::surface) return pass;
@@ -305,15 +263,7 @@ void MeshContacts::vertices_on_face(const ObstacleView& view, const CandidatePai
         surface, pair.b, tool, vertex, [&](const Vector3d& p_T) -> Vector3d { return view.X_OT_start * p_T; },
         [&](const Vector3d& p_T) -> Vector3d { return view.X_OT_end * p_T; });
     if (!pass) continue;
-    Contact contact;
-    contact.kind = ContactKind::vertex_face;
-    contact.p_TCa_m = tool.vertices_m()[vertex];
-    contact.n_W = view.X_WO.R * pass->plane.normal;
-    contact.p_WCb_m = view.X_WO * (pass->plane.offset_m * pass->plane.normal);
-    contact.offset_m = pass->plane.offset_m + contact.n_W.dot(view.X_WO.x_m);
-    contact.tool_feature = vertex;
-    contact.obstacle_feature = surface.planar_region(pair.b);
-    contact.obstacle = view.number;
+    const Contact contact = vertex_face_contact(view, tool, vertex, pair.b, pass->plane);
     add_contact(pass->closes, pass->path_fraction, view.X_WO * pass->p, contact);
   }
 }
@@ -329,15 +279,7 @@ void MeshContacts::face_on_vertices(const ObstacleView& view, const CandidatePai
         [&](const Vector3d& p_O) -> Vector3d { return view.X_OT_start.inverse_transform(p_O); },
         [&](const Vector3d& p_O) -> Vector3d { return view.X_OT_end.inverse_transform(p_O); });
     if (!pass) continue;
-    Contact contact;
-    contact.kind = ContactKind::face_vertex;
-    contact.d_T = -pass->plane.normal;
-    contact.p_TCa_m = pass->plane.offset_m * pass->plane.normal;
-    contact.p_WCb_m = view.X_WO * surface.vertices_m()[vertex];
-    contact.n_W = view.X_WO.R * (view.X_OT_end.R * contact.d_T);
-    contact.tool_feature = tool.planar_region(pair.a);
-    contact.obstacle_feature = vertex;
-    contact.obstacle = view.number;
+    const Contact contact = face_vertex_contact(view, tool, pair.a, pass->plane, vertex);
     add_contact(pass->closes, pass->path_fraction, contact.p_WCb_m, contact);
   }
 }
@@ -355,7 +297,6 @@ void MeshContacts::edges_on_edges(const ObstacleView& view, const CandidatePair&
 /// function of the path fraction: METHOD (95).
 void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a, std::uint32_t edge_a,
                                 std::uint32_t edge_b, SweepResult& result) noexcept {
-  constexpr double kParallel = 1e-7;  // sine of the angle below which two edges have no usable normal
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = view.obstacle->mesh->surface;
   const MeshSurface::Edge& eb = surface.convex_edges()[edge_b];
@@ -374,7 +315,7 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
   pass.da_end = a.end[j] - a.end[i];
   const Vector3d N_start = pass.da_start.cross(pass.db), N_end = pass.da_end.cross(pass.db);
   const double s_start = N_start.norm(), s_end = N_end.norm();
-  const double parallel = kParallel * pass.da_end.norm() * pass.db.norm();
+  const double parallel = sweep_tolerance::kParallel * pass.da_end.norm() * pass.db.norm();
   if (!(s_start > parallel) || !(s_end > parallel)) return;
   // Outward is away from both faces of the obstacle and towards those of the tool.
   const Vector3d w_start = pass.a0_start - pass.b0, w_end = pass.a0_end - pass.b0;
@@ -403,8 +344,8 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
     return;
   }
   const double start_m = f_start / s_start, end_m = f_end / s_end;
-  if (start_m < -kStartTolerance * clearance_m_) return;
-  const bool open = end_m > (1.0 + kClosingTolerance) * clearance_m_;
+  if (start_m < -sweep_tolerance::kStart * clearance_m_) return;
+  const bool open = end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_;
   if (open && f_middle >= 0.0) return;
   const double g_start = f_start - clearance_m_ * s_start, g_end = f_end - clearance_m_ * s_end;
   const double g_middle = f_middle - 0.5 * clearance_m_ * (s_start + s_end);
@@ -412,7 +353,7 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
   const bool closes = this->closes(start_m, end_m);
   if (closes) {
     if (!edges_touch(view, pass, crossing_fraction, feature_margin_m_)) return;
-  } else if (open || !edges_touch(view, pass, 1.0, kTouchTolerance * clearance_m_)) {
+  } else if (open || !edges_touch(view, pass, 1.0, sweep_tolerance::kTouch * clearance_m_)) {
     // The edges separated again. If they overlapped deeply before, the tool met other features unnoticed: the
     // path is too long.
     const double curvature = g_start - 2.0 * g_middle + g_end;
@@ -422,17 +363,8 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
       result.overlaps = true;
     return;
   }
-  const MeshSurface::Edge& ea = tool.convex_edges()[edge_a];
-  Contact contact;
-  contact.kind = ContactKind::edge_edge;
-  contact.p_TCa_m = tool.vertices_m()[ea.vertices[0]];
-  contact.d_T = (tool.vertices_m()[ea.vertices[1]] - contact.p_TCa_m).normalized();
-  contact.p_WCb_m = view.X_WO * pass.b0;
-  contact.d_W = view.X_WO.R * (pass.db * (pass.sign / pass.db.norm()));
-  contact.n_W = view.X_WO.R * (N_end * (pass.sign / s_end));
-  contact.tool_feature = edge_a;
-  contact.obstacle_feature = edge_b;
-  contact.obstacle = view.number;
+  const Contact contact =
+      edge_edge_contact(view, tool, edge_a, edge_b, pass.sign, N_end * (pass.sign / s_end));
   add_contact(closes, crossing_fraction, view.X_WO * pass.p, contact);
 }
 
@@ -473,41 +405,9 @@ bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, d
 void MeshContacts::add_contact(bool closes, double path_fraction, const Vector3d& point_W_m,
                                const Contact& contact) noexcept {
   if (closes)
-    add_crossing(path_fraction, point_W_m, contact);
+    crossings_.add(path_fraction, point_W_m, contact);
   else if (!touching_.contains(contact))
     touching_.add(contact);
-}
-
-/// If there is no room left, an earlier crossing replaces the latest one.
-void MeshContacts::add_crossing(double fraction, const Vector3d& point_W_m, const Contact& contact) noexcept {
-  if (crossings_.size() < crossings_.capacity()) {
-    crossings_.push_back({fraction, point_W_m, contact});
-    return;
-  }
-  const auto last = std::max_element(
-      crossings_.begin(), crossings_.end(),
-      [](const Crossing& a, const Crossing& b) { return a.path_fraction < b.path_fraction; });
-  if (fraction < last->path_fraction) *last = {fraction, point_W_m, contact};
-}
-
-void MeshContacts::select_first_contacts(SweepResult& result) noexcept {
-  if (crossings_.empty()) return;
-  std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
-    if (a.path_fraction != b.path_fraction) return a.path_fraction < b.path_fraction;
-    if (a.contact.tool_feature != b.contact.tool_feature)
-      return a.contact.tool_feature < b.contact.tool_feature;
-    return a.contact.obstacle_feature < b.contact.obstacle_feature;
-  });
-  const double close_m = std::min(kDuplicateDistance * displacement_bound_m_, 0.25 * scene_.tool_radius_m());
-  StaticVector<Vector3d, kMaxContacts> points;
-  for (const Crossing& crossing : crossings_) {
-    bool duplicate = false;
-    for (std::size_t i = 0; i < points.size() && !duplicate; ++i)
-      duplicate = (points[i] - crossing.point_W_m).squaredNorm() < close_m * close_m &&
-                  result.contacts[i].n_W.dot(crossing.contact.n_W) > kSameNormal;
-    if (duplicate || !result.contacts.add(crossing.contact)) continue;
-    points.add(crossing.point_W_m);
-  }
 }
 
 }  // namespace wrenchd

@@ -12,86 +12,63 @@
 #include "collision/pairs/separating_axes.hpp"
 #include "collision/pairs/triangle_intersection.hpp"
 #include "collision/scene.hpp"
+#include "collision/sweep_crossings.hpp"
+#include "collision/sweep_query.hpp"
 #include "core/contact.hpp"
 #include "core/frame.hpp"
 #include "core/static_vector.hpp"
 
 namespace wrenchd {
 
-/// Sweep queries: finds the contacts that the tool's surface meets on the straight path from one pose to
-/// another. collision/README.md ("The sweep") and core/METHOD.md, section 14.3, describe the design.
+/// Sweep queries on wrenchd's own BVH and kernels. collision/README.md ("The sweep") describes the design.
 ///
 /// A predictive candidate list (pairs/predictive_candidate_list.hpp) supplies the pairs of triangles near the
 /// path. The constructor allocates all memory. One object serves one thread. All members but the constructor
 /// are RT-safe.
-class MeshContacts {
+class MeshContacts final : public SweepQuery {
  public:
-  static constexpr std::size_t kMaxContacts = 12;
-
-  struct SweepResult {
-    /// The contacts met, in the order along the path. The list may be incomplete, but it is never empty if
-    /// the tool meets a contact.
-    StaticVector<Contact, kMaxContacts> contacts;
-    /// True if the end pose overlaps an obstacle and no crossing was found on the path. The path is then too
-    /// long. Only end poses of paths with large rotation are always tested.
-    bool overlaps = false;
-    /// False if the path needs more work than the budget allows. The other members are then undefined.
-    bool complete = true;
-    /// True if `complete` is false because a candidate list is still under construction.
-    bool list_pending = false;
-  };
-
   /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
   explicit MeshContacts(const Scene& scene);
-  MeshContacts(const MeshContacts&) = delete;  // a copy would lose the reserved memory
-  MeshContacts& operator=(const MeshContacts&) = delete;
 
   /// Sets the start of the next sweeps: a pose that is admissible at scene time time_s [s]. RT-safe.
-  void set_start(const Pose& X_WT, double time_s = 0.0) noexcept;
+  void set_start(const Pose& X_WT, double time_s = 0.0) noexcept override;
 
   /// Sweeps the path from the start to X_WT while the obstacles move to their poses at time_s [s]. Contacts
   /// are held open by clearance_m [m]. The result states the contacts for the obstacle poses at time_s.
   /// Reduces `budget` by the work done. RT-safe.
-  SweepResult sweep(const Pose& X_WT, double clearance_m, VisitBudget& budget, double time_s = 0.0) noexcept;
+  SweepResult sweep(const Pose& X_WT, double clearance_m, VisitBudget& budget,
+                    double time_s = 0.0) noexcept override;
 
   /// Prefetches candidate pairs for the predicted path. Call it once per tick with the tool pose X_WT and the
   /// commanded pose X_WP. spare_visits: node visits that the prefetch may use even if it does not need them
   /// yet. RT-safe.
   void prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s = 0.0,
-                std::uint32_t spare_visits = 0) noexcept;
+                std::uint32_t spare_visits = 0) noexcept override;
 
   /// Returns the fraction [0, 1] of the path from the start to X_WT that the current candidate list covers.
   /// Precondition: no obstacle moves. RT-safe.
-  double covered_fraction(const Pose& X_WT) const noexcept {
+  double covered_fraction(const Pose& X_WT) const noexcept override {
     return candidates_.covered_fraction(X_start_, X_WT);
   }
   /// Returns the cost of a candidate list per tick in which it is used [node visits]. RT-safe.
-  double list_visits_per_tick() const noexcept { return candidates_.list_visits_per_tick(); }
+  double list_visits_per_tick() const noexcept override {
+    return candidates_.list_visits_per_tick();
+  }
 
   /// Returns the work of this tick's sweeps without candidate lists [node visits]. RT-safe.
-  std::uint32_t sweep_visits() const noexcept { return sweep_visits_; }
+  std::uint32_t sweep_visits() const noexcept override { return sweep_visits_; }
 
   /// Discards predictions and candidate lists, for example after the tool was placed elsewhere. RT-safe.
-  void reset() noexcept { candidates_.reset(); }
+  void reset() noexcept override { candidates_.reset(); }
 
   /// The contacts whose gap at the end pose of the last sweep is at most the clearance, plus rounding.
-  const ContactSet& touching() const noexcept { return touching_; }
+  const ContactSet& touching() const noexcept override { return touching_; }
 
-  std::size_t candidate_count() const noexcept { return candidates_.current().pairs().size(); }
+  std::size_t candidate_count() const noexcept override {
+    return candidates_.current().pairs().size();
+  }
 
  private:
-  struct Crossing {
-    double path_fraction;  ///< position on the path: 0 at the start, 1 at the end
-    Vector3d point_W_m;
-    Contact contact;
-  };
-  /// One obstacle and the tool's path in the frame O of the obstacle's mesh.
-  struct ObstacleView {
-    const MeshObstacle* obstacle;
-    std::uint32_t number;  ///< number of the obstacle in the scene
-    Frame X_WO;            ///< pose of the obstacle at the end of the path
-    Frame X_OT_start, X_OT_end;
-  };
   /// A triangle of the tool in the obstacle's frame, at both ends of the path.
   struct MovedTriangle {
     std::uint32_t triangle = MeshSurface::kNone;
@@ -137,8 +114,6 @@ class MeshContacts {
                    double tolerance_m) const noexcept;
   void add_contact(bool closes, double path_fraction, const Vector3d& point_W_m,
                    const Contact& contact) noexcept;
-  void add_crossing(double fraction, const Vector3d& point_W_m, const Contact& contact) noexcept;
-  void select_first_contacts(SweepResult& result) noexcept;
   void verify_end_pose(VisitBudget& budget, SweepResult& result) noexcept;
 
   const Scene& scene_;
@@ -159,7 +134,7 @@ class MeshContacts {
   SeparatingAxes separating_axes_;
   MovedTriangle moved_triangle_;
   std::uint32_t tested_pairs_ = 0;  ///< number of pairs that reached the feature tests
-  std::vector<Crossing> crossings_;
+  CrossingList crossings_;
   BvhTraversal traversal_;  ///< for verify_end_pose() only
   std::uint32_t sweep_visits_ = 0;
   bool overlap_found_ = false;  ///< a sweep of this tick reported an overlap

@@ -58,8 +58,8 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
   if (options.method != Method::exact && !convex) throw std::invalid_argument(only_exact_reason(scene));
-  if (options.method == Method::exact) proxy_.emplace(scene, options.work_limit);
-  if (!convex) pose_search_.emplace(scene);
+  if (options.method == Method::exact) proxy_.emplace(scene, options.work_limit, options.contacts);
+  if (!convex) pose_search_.emplace(scene, options.contacts);
 }
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept {

@@ -11,6 +11,7 @@
 #include "collision/proxy.hpp"
 #include "collision/scene_contacts.hpp"
 #include "core/contact.hpp"
+#include "core/contact_backend.hpp"
 #include "core/descent.hpp"
 #include "core/friction.hpp"
 #include "core/method.hpp"
@@ -45,6 +46,8 @@ class PenetrationDepth {
     double clearance_m = 0.0;
     FrictionSettings friction = {};    ///< friction of a followed proxy; method exact only
     Proxy::WorkLimit work_limit = {};  ///< work limit of one tick of a followed proxy
+    /// What detects contacts between meshes. With ContactBackend::cgal no member is RT-safe.
+    ContactBackend contacts = ContactBackend::native;
   };
 
   /// Keeps a reference to the scene, which must outlive this object. Throws std::invalid_argument if the

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "collision/contact_detection.hpp"
 #include "core/metric.hpp"
 
 namespace wrenchd {
@@ -57,13 +58,16 @@ bool all_open(std::span<const ActiveContact> contacts, const Pose& X_WT) noexcep
 
 }  // namespace
 
-Proxy::Proxy(const Scene& scene, WorkLimit effort)
+Proxy::Proxy(const Scene& scene, WorkLimit effort, ContactBackend contacts)
     : scene_(scene),
       work_limit_(effort),
       M_(scene.tool().solid.inertia),
       exact_(M_, ExactProjection::Budget{}, kClearance_m),
       half_spaces_(scene),
-      meshes_(scene) {}
+      meshes_(make_sweep_query(scene, contacts)) {
+  // The balancer counts node visits, which CGAL's trees do not report.
+  if (contacts == ContactBackend::cgal) work_limit_.balanced = false;
+}
 
 void Proxy::hold(const Pose& X_last) noexcept {
   sweeps_ = 0;
@@ -76,7 +80,7 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) no
   sweeps_ = 0;
   iterations_ = 0;
   set_budget(X_last_WP_ ? displacement_bound_m(*X_last_WP_, X_WP) : 0.0);
-  meshes_.set_start(X_WQ_, admissible_time_s_);
+  meshes_->set_start(X_WQ_, admissible_time_s_);
   const Projection q = solve(X_WP, time_s);
   if (!deferred_) first_step_fraction_ = 1.0;
   prefetch(q.X_WQ, X_WP);
@@ -108,9 +112,9 @@ void Proxy::prefetch(const Pose& X_WT, const Pose& X_WP) noexcept {
     budget_.reserved = std::max(budget_.reserved, work_limit_.node_visits - prefetch_end);
     spare_visits = static_cast<std::uint32_t>(std::max(target - node_visits(), 0.0));
   }
-  const std::uint32_t sweep_visits = meshes_.sweep_visits() + sweeps_ * kVisitsPerSweep;
-  meshes_.prefetch(X_WT, X_WP, budget_, admissible_time_s_, spare_visits);
-  balancer_.update(sweep_visits, meshes_.list_visits_per_tick(), deferred_);
+  const std::uint32_t sweep_visits = meshes_->sweep_visits() + sweeps_ * kVisitsPerSweep;
+  meshes_->prefetch(X_WT, X_WP, budget_, admissible_time_s_, spare_visits);
+  balancer_.update(sweep_visits, meshes_->list_visits_per_tick(), deferred_);
 }
 
 bool Proxy::target_reached() const noexcept {
@@ -120,7 +124,7 @@ bool Proxy::target_reached() const noexcept {
 void Proxy::clear_history(double time_s) noexcept {
   known_contacts_.clear();
   X_last_WP_.reset();
-  meshes_.reset();
+  meshes_->reset();
   balancer_.reset();
   first_step_fraction_ = 1.0;
   admissible_time_s_ = known_contacts_time_s_ = time_s;
@@ -165,14 +169,14 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
           std::max((q.X_WQ.translation_m - X_WQ_.translation_m).norm(),
                    scene_.tool_radius_m() * q.X_WQ.rotation.angularDistance(X_WQ_.rotation));
       fraction =
-          std::min(fraction, kCoveredFraction * meshes_.covered_fraction(q.X_WQ) * distance_m / longest_m);
+          std::min(fraction, kCoveredFraction * meshes_->covered_fraction(q.X_WQ) * distance_m / longest_m);
       continue;
     }
     first_step_fraction_ = 1.0;
     X_WQ_ = q.X_WQ;
-    meshes_.set_start(X_WQ_, admissible_time_s_);
+    meshes_->set_start(X_WQ_, admissible_time_s_);
     if (deferred_) break;
-    if (meshes_.candidate_count() == 0) longest_m *= kGrowthAfterFree;  // no obstacle is near
+    if (meshes_->candidate_count() == 0) longest_m *= kGrowthAfterFree;  // no obstacle is near
     const bool all_kept = !drop_separated_contacts(q);
     fraction = all_kept ? std::min(1.0, kGrowthAfterFree * fraction) : kCautiousFraction;
     if (!all_kept && target_reached()) {
@@ -229,7 +233,7 @@ bool Proxy::yield_to_obstacles(double time_s) noexcept {
     }
     X_WQ_ = q.X_WQ;
     admissible_time_s_ = next_s;
-    meshes_.set_start(X_WQ_, admissible_time_s_);
+    meshes_->set_start(X_WQ_, admissible_time_s_);
     drop_separated_contacts(q);
     fraction = std::min(1.0, kGrowthAfterFree * fraction);
   }
@@ -284,7 +288,7 @@ Proxy::PathResult Proxy::sweep_along(const Pose& X_WT, double time_s) noexcept {
   half_spaces_.add_violated(Frame(X_WT), tolerance_m, met);
   for (const Contact& contact : met) found_new = add_known_contact(contact) || found_new;
   if (scene_.meshes().empty()) return found_new ? PathResult::contacts_found : PathResult::free;
-  const MeshContacts::SweepResult found = meshes_.sweep(X_WT, kClearance_m, budget_, time_s);
+  const SweepQuery::SweepResult found = meshes_->sweep(X_WT, kClearance_m, budget_, time_s);
   if (!found.complete) return found.list_pending ? PathResult::list_pending : PathResult::path_too_long;
   for (const Contact& contact : found.contacts) found_new = add_known_contact(contact) || found_new;
   if (found_new) return PathResult::contacts_found;
@@ -312,7 +316,7 @@ bool Proxy::drop_separated_contacts(const Projection& q) noexcept {
   bool dropped_loaded = false;
   known_contacts_.clear();
   for (const ActiveContact& active : q.active) {
-    if (active.contact.obstacle < scene_.first_mesh() || meshes_.touching().contains(active.contact))
+    if (active.contact.obstacle < scene_.first_mesh() || meshes_->touching().contains(active.contact))
       known_contacts_.add(active);
     else
       dropped_loaded = dropped_loaded || active.multiplier > 0.0;

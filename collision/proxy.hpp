@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "collision/half_space_contacts.hpp"
-#include "collision/mesh_contacts.hpp"
+#include "collision/scene.hpp"
+#include "collision/sweep_query.hpp"
 #include "collision/work_balancer.hpp"
+#include "core/contact_backend.hpp"
 #include "core/projection.hpp"
 
 namespace wrenchd {
@@ -25,7 +28,8 @@ namespace wrenchd {
 /// (work_balancer.hpp) keeps the work of all ticks similar. Where obstacles move, no work is deferred.
 ///
 /// The constructor allocates all memory. One object serves one thread. All members but the constructor are
-/// RT-safe.
+/// RT-safe, unless CGAL detects the contacts (ContactBackend::cgal): then a tick allocates, no work is
+/// deferred, and only the limit of sweeps applies.
 class Proxy {
  public:
   /// The gap at which contacts are held open [m]. It is far above rounding errors and far below human
@@ -42,8 +46,9 @@ class Proxy {
   };
 
   /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
-  explicit Proxy(const Scene& scene) : Proxy(scene, WorkLimit{}) {}
-  Proxy(const Scene& scene, WorkLimit effort);
+  explicit Proxy(const Scene& scene, ContactBackend contacts = ContactBackend::native)
+      : Proxy(scene, WorkLimit{}, contacts) {}
+  Proxy(const Scene& scene, WorkLimit effort, ContactBackend contacts = ContactBackend::native);
 
   /// Computes one tick: moves from X_last, the q of the previous tick, towards p. time_s: scene time of the
   /// obstacle poses [s]. The status is infeasible if moving obstacles have trapped the tool. RT-safe.
@@ -64,7 +69,7 @@ class Proxy {
   std::uint32_t node_visits() const noexcept {
     return work_limit_.node_visits - budget_.remaining;
   }  ///< node visits of the last tick
-  std::size_t candidate_count() const noexcept { return meshes_.candidate_count(); }
+  std::size_t candidate_count() const noexcept { return meshes_->candidate_count(); }
 
  private:
   using KnownContacts = StaticVector<ActiveContact, ContactSet::kCapacity>;
@@ -90,7 +95,7 @@ class Proxy {
   Inertia M_;
   ExactProjection exact_;
   HalfSpaceContacts half_spaces_;
-  MeshContacts meshes_;
+  std::unique_ptr<SweepQuery> meshes_;
   KnownContacts known_contacts_;
   std::optional<Pose> X_last_WP_;       ///< p of the previous tick
   Pose X_WQ_;                           ///< the present admissible pose
