@@ -234,7 +234,8 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass(
     start_m = -start_m;
     end_m = -end_m;
   }
-  if (end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_ || start_m < -sweep_tolerance::kStart * clearance_m_)
+  if (end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_ ||
+      start_m < -sweep_tolerance::kStart * clearance_m_)
     return {};
   pass.closes = closes(start_m, end_m);
   pass.path_fraction = pass.closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;

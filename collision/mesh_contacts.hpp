@@ -51,9 +51,7 @@ class MeshContacts final : public SweepQuery {
     return candidates_.covered_fraction(X_start_, X_WT);
   }
   /// Returns the cost of a candidate list per tick in which it is used [node visits]. RT-safe.
-  double list_visits_per_tick() const noexcept override {
-    return candidates_.list_visits_per_tick();
-  }
+  double list_visits_per_tick() const noexcept override { return candidates_.list_visits_per_tick(); }
 
   /// Returns the work of this tick's sweeps without candidate lists [node visits]. RT-safe.
   std::uint32_t sweep_visits() const noexcept override { return sweep_visits_; }
@@ -64,9 +62,7 @@ class MeshContacts final : public SweepQuery {
   /// The contacts whose gap at the end pose of the last sweep is at most the clearance, plus rounding.
   const ContactSet& touching() const noexcept override { return touching_; }
 
-  std::size_t candidate_count() const noexcept override {
-    return candidates_.current().pairs().size();
-  }
+  std::size_t candidate_count() const noexcept override { return candidates_.current().pairs().size(); }
 
  private:
   /// A triangle of the tool in the obstacle's frame, at both ends of the path.

@@ -55,6 +55,10 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
     friction_.emplace(scene.tool().solid.inertia, options.friction,
                       scene.meshes().empty() ? options.clearance_m : Proxy::kClearance_m);
   }
+  if (options.contacts == ContactBackend::cgal && options.method != Method::exact)
+    throw std::invalid_argument(
+        "only method exact detects contacts with CGAL; choose it, or remove [rendering] contacts "
+        "(--contacts)");
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
   if (options.method != Method::exact && !convex) throw std::invalid_argument(only_exact_reason(scene));

@@ -2,6 +2,7 @@
 #include "collision/sweep_crossings.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace wrenchd {
 namespace {
@@ -81,9 +82,8 @@ void CrossingList::select_first(double displacement_bound_m, double tool_radius_
   if (crossings_.empty()) return;
   std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
     if (a.path_fraction != b.path_fraction) return a.path_fraction < b.path_fraction;
-    if (a.contact.tool_feature != b.contact.tool_feature)
-      return a.contact.tool_feature < b.contact.tool_feature;
-    return a.contact.obstacle_feature < b.contact.obstacle_feature;
+    return std::tie(a.contact.tool_feature, a.contact.obstacle_feature, a.contact.kind, a.contact.obstacle) <
+           std::tie(b.contact.tool_feature, b.contact.obstacle_feature, b.contact.kind, b.contact.obstacle);
   });
   const double close_m = std::min(kDuplicateDistance * displacement_bound_m, 0.25 * tool_radius_m);
   StaticVector<Vector3d, SweepQuery::kMaxContacts> points;

@@ -107,7 +107,9 @@ class CrossingList {
   /// If there is no room left, an earlier crossing replaces the latest one.
   void add(double path_fraction, const Vector3d& point_W_m, const Contact& contact) noexcept;
 
-  /// Sorts the crossings along the path, then copies them to `contacts`, the first of several close together.
+  /// Sorts the crossings along the path, and those at one place by their features, so that the order does
+  /// not depend on the order in which they were found. Then copies them to `contacts`, the first of several
+  /// close together.
   /// displacement_bound_m: length of the path.
   void select_first(double displacement_bound_m, double tool_radius_m,
                     StaticVector<Contact, SweepQuery::kMaxContacts>& contacts) noexcept;

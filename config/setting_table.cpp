@@ -207,6 +207,8 @@ constexpr std::array kTable = {
                                        {"descent", Method::descent},
                                        {"translational", Method::translational}})),
     WRENCHD_INTEGER("rendering", "planes", new_rendering, rendering.planes, 1, 1000),
+    WRENCHD_SETTING("rendering", "contacts", "", new_rendering, rendering.contacts,
+                    value.choice(out, {{"native", ContactBackend::native}, {"cgal", ContactBackend::cgal}})),
     WRENCHD_SETTING("rendering.friction", "static", "", new_rendering, rendering.friction.static_coefficient,
                     value.number(out, kCoefficient)),
     WRENCHD_SETTING("rendering.friction", "dynamic", "", new_rendering, rendering.friction.dynamic_coefficient,
@@ -314,6 +316,9 @@ void check_rendering(const SectionValues& values, Settings& settings) {
   if (settings.rendering.friction.enabled() && settings.rendering.method != Method::exact)
     values.value("friction")
         .reject("only method = \"exact\" supports friction; choose it, or leave friction out");
+  if (settings.rendering.contacts == ContactBackend::cgal && settings.rendering.method != Method::exact)
+    values.value("contacts")
+        .reject("only method = \"exact\" detects contacts with CGAL; choose it, or leave contacts out");
 }
 
 struct Section {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/contact_backend.hpp"
 #include "core/friction.hpp"
 #include "core/limits.hpp"
 #include "core/method.hpp"
@@ -32,8 +33,9 @@ struct ServoSettings {
 /// [rendering]
 struct RenderingSettings {
   Method method = Method::exact;
-  int planes = 47;            ///< number of planes N_delta of Eq. (40), for method = "planar"
-  FrictionSettings friction;  ///< friction, for method = "exact"
+  int planes = 47;  ///< number of planes N_delta of Eq. (40), for method = "planar"
+  ContactBackend contacts = ContactBackend::native;  ///< contact detection between meshes
+  FrictionSettings friction;                         ///< friction, for method = "exact"
 };
 
 /// Default gains of [wrench]. At 1 kHz with 1.4 ms of delay a wall is stable up to (b + B) / (T/2 + delay) =

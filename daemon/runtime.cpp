@@ -87,8 +87,9 @@ Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMo
       recorded_texts_(read_recorded_texts(config_)),
       device_(config_.profile, link),
       loop_(config_.settings, config_.profile, device_,
-            std::make_unique<Rendering>(0, config_.settings, config_.profile, scene_,
-                                        make_proxy_initializer(scene_, search_mode)),
+            std::make_unique<Rendering>(
+                0, config_.settings, config_.profile, scene_,
+                make_proxy_initializer(scene_, search_mode, config_.settings.rendering.contacts)),
             clock),
       reconfigurator_(config_, scene_, loop_, search_mode, fresh) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());

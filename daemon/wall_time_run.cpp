@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <future>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "daemon/contact_rate.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/servo/realtime_watch.hpp"
 
@@ -69,6 +71,33 @@ void report_realtime(const RealtimeWatch::Change& change, Runtime& runtime) {
               disarms ? "; disarmed, because realtime = \"required\"" : "");
 }
 
+/// Logs the rate that the scene allows, as soon as CGAL detects the contacts. A client may choose CGAL while
+/// the loop runs.
+class ContactRateLog {
+ public:
+  explicit ContactRateLog(Runtime& runtime)
+      : runtime_(runtime), report_(runtime.config().settings.servo.rate_Hz) {}
+
+  void check() {
+    if (runtime_.reconfigurator().contacts() != ContactBackend::cgal) return;
+    if (!std::exchange(started_, true)) spdlog::warn("{}", ContactRateReport::start_text());
+    print(report_.check(runtime_.loop().telemetry().timing()));
+  }
+  void close() {
+    if (started_) print(report_.close(runtime_.loop().telemetry().timing()));
+  }
+
+ private:
+  static void print(const std::optional<ContactRateReport::Message>& message) {
+    if (message)
+      spdlog::log(message->too_slow ? spdlog::level::warn : spdlog::level::info, "{}", message->text);
+  }
+
+  Runtime& runtime_;
+  ContactRateReport report_;
+  bool started_ = false;
+};
+
 }  // namespace
 
 Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::string& device, TimePoint end,
@@ -83,15 +112,18 @@ Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::s
       },
       device);
   RealtimeWatch realtime(servo_thread.id());
+  ContactRateLog contact_rate(runtime);
   while (!context.signals.stop_requested() && !servo_thread.ended() && clock.now() < end) {
     std::this_thread::sleep_until(requests.next_time(clock.now() + kSamplePeriod));
     requests.send_due(loop, clock.now());
     view.sample(loop);
+    contact_rate.check();
     if (const auto change = realtime.check()) report_realtime(*change, runtime);
   }
   const Fault latched = latched_fault(loop);
   if (!servo_thread.ended()) context.service.stopping("stopping");
   const Fault fault = servo_thread.join();
+  contact_rate.close();
   return fault == Fault::none ? latched : fault;
 }
 

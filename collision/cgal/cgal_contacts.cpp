@@ -150,14 +150,12 @@ CgalContacts::MovedTriangle CgalContacts::moved_triangle(const ObstacleView& vie
 bool CgalContacts::plane_separates(const MeshSurface::Plane& plane_start, const MeshSurface::Plane& plane_end,
                                    const Triangle& start, const Triangle& end, double min_gap_m) const {
   const auto all = [](const Triangle& triangle, const MeshSurface::Plane& plane, double height, int side) {
-    return std::all_of(triangle.begin(), triangle.end(), [&](const Vector3d& p) {
-      return side * exact::side_of_plane(plane, height, p) > 0;
-    });
+    return std::all_of(triangle.begin(), triangle.end(),
+                       [&](const Vector3d& p) { return side * exact::side_of_plane(plane, height, p) > 0; });
   };
   const auto none = [](const Triangle& triangle, const MeshSurface::Plane& plane, double height, int side) {
-    return std::none_of(triangle.begin(), triangle.end(), [&](const Vector3d& p) {
-      return side * exact::side_of_plane(plane, height, p) > 0;
-    });
+    return std::none_of(triangle.begin(), triangle.end(),
+                        [&](const Vector3d& p) { return side * exact::side_of_plane(plane, height, p) > 0; });
   };
   if (all(end, plane_end, (1.0 + kClosing) * clearance_m_ + min_gap_m, 1))
     return none(start, plane_start, min_gap_m, -1);
@@ -208,12 +206,9 @@ void CgalContacts::test_pair(const ObstacleView& view, const MovedTriangle& a, s
 /// fraction: METHOD (94). at_start, at_end: transform a point of the vertex's body to the frame of the face's
 /// body.
 template <class AtStart, class AtEnd>
-std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass(const MeshSurface& face_body,
-                                                                  std::uint32_t triangle,
-                                                                  const MeshSurface& vertex_body,
-                                                                  std::uint32_t vertex,
-                                                                  const AtStart& at_start,
-                                                                  const AtEnd& at_end) const {
+std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass(
+    const MeshSurface& face_body, std::uint32_t triangle, const MeshSurface& vertex_body,
+    std::uint32_t vertex, const AtStart& at_start, const AtEnd& at_end) const {
   const MeshSurface::Plane& front = face_body.planes()[triangle];
   const Vector3d& p_body = vertex_body.vertices_m()[vertex];
   const Vector3d p_start = at_start(p_body), p_end = at_end(p_body);
@@ -249,8 +244,8 @@ void CgalContacts::test_edges(const ObstacleView& view, const MovedTriangle& a, 
   const MeshSurface::Edge& ea = tool.convex_edges()[edge_a];
   const MeshSurface::Edge& eb = surface.convex_edges()[edge_b];
   const auto& corners = tool.triangles()[a.triangle];
-  const auto i = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), ea.vertices[0]) -
-                                          corners.begin());
+  const auto i =
+      static_cast<std::size_t>(std::find(corners.begin(), corners.end(), ea.vertices[0]) - corners.begin());
   const std::size_t j = (i + 1) % 3;
   const Vector3d& b0 = surface.vertices_m()[eb.vertices[0]];
   const Vector3d db = surface.vertices_m()[eb.vertices[1]] - b0;
@@ -324,8 +319,8 @@ bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fractio
   const MeshSurface& tool = tool_tree_->surface();
   const MeshSurface& surface = pass.view.obstacle->mesh->surface;
   const exact::EdgePair at = {interpolate(pass.start.a0, pass.end.a0, fraction),
-                              interpolate(pass.start.da, pass.end.da, fraction), pass.start.b0,
-                              pass.start.db, sign};
+                              interpolate(pass.start.da, pass.end.da, fraction), pass.start.b0, pass.start.db,
+                              sign};
   if (!exact::edges_opposite(at, tolerance_m)) return false;
   const Vector3d N = at.da.cross(at.db), w = at.b0 - at.a0;
   const double NN = N.squaredNorm();
@@ -342,7 +337,8 @@ bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fractio
   for (const std::uint32_t t : tool.convex_edges()[pass.edge_a].triangles)
     for (int k = 0; k < 3; ++k) {
       const Vector3d& p_T = tool.corner_m(t, k);
-      if (!falls_away(interpolate(pass.view.X_OT_start * p_T, pass.view.X_OT_end * p_T, fraction) - at.a0, 1.0))
+      if (!falls_away(interpolate(pass.view.X_OT_start * p_T, pass.view.X_OT_end * p_T, fraction) - at.a0,
+                      1.0))
         return false;
     }
   return true;

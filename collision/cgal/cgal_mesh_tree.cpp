@@ -134,9 +134,9 @@ bool CgalMeshTree::contains(const Vector3d& p_m) const {
   // Oblique directions: a segment that meets a vertex or an edge of the mesh does not count; the next one is
   // tried.
   static const std::array<Vector3d, 6> kDirections = {
-      Vector3d(0.8626, 0.3919, 0.3199),   Vector3d(-0.3577, 0.8713, 0.3361),
-      Vector3d(0.2153, -0.4441, 0.8697),  Vector3d(-0.7129, -0.5101, -0.4811),
-      Vector3d(0.1013, 0.2371, -0.9661),  Vector3d(-0.5519, 0.6067, -0.5723)};
+      Vector3d(0.8626, 0.3919, 0.3199),  Vector3d(-0.3577, 0.8713, 0.3361),
+      Vector3d(0.2153, -0.4441, 0.8697), Vector3d(-0.7129, -0.5101, -0.4811),
+      Vector3d(0.1013, 0.2371, -0.9661), Vector3d(-0.5519, 0.6067, -0.5723)};
   const CGAL::Bbox_3 box = tree_->tree.bbox();
   const Point p = to_point(p_m);
   if (!CGAL::do_overlap(p.bbox(), box)) return false;

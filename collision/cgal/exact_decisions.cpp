@@ -23,9 +23,7 @@ struct Vector {
 
   Vector operator-(const Vector& v) const { return {x - v.x, y - v.y, z - v.z}; }
   Number dot(const Vector& v) const { return x * v.x + y * v.y + z * v.z; }
-  Vector cross(const Vector& v) const {
-    return {y * v.z - z * v.y, z * v.x - x * v.z, x * v.y - y * v.x};
-  }
+  Vector cross(const Vector& v) const { return {y * v.z - z * v.y, z * v.x - x * v.z, x * v.y - y * v.x}; }
 };
 
 /// Evaluates a decision in interval arithmetic, then in rational arithmetic if that is not certain.
@@ -119,7 +117,8 @@ struct Opposite {
     const Number x = w.cross(db).dot(N), y = w.cross(da).dot(N);
     const Number room = Number(tolerance_m) * Number(tolerance_m) * NN * NN;
     const auto beyond = [&](const Number& distance, const Vector<Number>& along) {
-      return certain_sign<Number>(distance) > 0 && certain_sign<Number>(distance * distance * along.dot(along) - room) > 0;
+      return certain_sign<Number>(distance) > 0 &&
+             certain_sign<Number>(distance * distance * along.dot(along) - room) > 0;
     };
     return !beyond(-x, da) && !beyond(x - NN, da) && !beyond(-y, db) && !beyond(y - NN, db);
   }

@@ -112,6 +112,7 @@ Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> sc
       loop_(loop),
       proxy_search_mode_(proxy_search_mode),
       loader_(std::move(loader)),
+      contacts_(config_.settings.rendering.contacts),
       names_{0, names_of(*scene_)} {}
 
 Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene) const {
@@ -134,7 +135,7 @@ Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& s
 /// Virtual time has no warm-up: its result depends on the speed of the machine.
 std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& settings,
                                                            std::shared_ptr<const Scene> scene) {
-  auto initializer = make_proxy_initializer(scene, proxy_search_mode_);
+  auto initializer = make_proxy_initializer(scene, proxy_search_mode_, settings.rendering.contacts);
   auto rendering = std::make_unique<Rendering>(rendering_id_ + 1, settings, config_.profile, std::move(scene),
                                                std::move(initializer));
   const HandlePose hand = loop_.telemetry().handle_pose();
@@ -145,6 +146,7 @@ std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& setti
 void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings& settings,
                            SceneSettings scene, std::shared_ptr<const Scene> built) {
   config_.settings = settings;
+  contacts_.store(settings.rendering.contacts);
   config_.scene = std::move(scene);
   scene_ = std::move(built);
   rendering_id_ = rendering->id();

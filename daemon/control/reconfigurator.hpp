@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "collision/meshes/mesh_loader.hpp"
 #include "config/toml_file.hpp"
+#include "core/contact_backend.hpp"
 #include "daemon/run_config.hpp"
 #include "daemon/servo/servo_loop.hpp"
 
@@ -85,6 +87,8 @@ class Reconfigurator {
 
   Settings settings() const;
   SceneSettings scene() const;
+  /// What detects the contacts of the rendering that was offered last.
+  ContactBackend contacts() const noexcept { return contacts_.load(); }
   WorkspaceRequest workspace() const;
   /// The rendering that was offered to the loop last.
   struct CurrentRendering {
@@ -150,7 +154,7 @@ class Reconfigurator {
   bool is_profile_changed(const DeviceSettings& device) const;
   ReloadedScene reload_scene(const SceneSettings& scene);
 
-  mutable std::mutex mutex_;       ///< protects all members but names_
+  mutable std::mutex mutex_;       ///< protects all members but contacts_ and names_
   RunConfig config_;               ///< present values
   Settings file_settings_;         ///< values that came from files; a client may have changed config_ since
   std::string profile_text_;       ///< text of the profile at the start
@@ -163,6 +167,7 @@ class Reconfigurator {
   std::uint64_t checksum_ = 0;
   WorkspaceRequest workspace_;
   LocalModelSet models_;
+  std::atomic<ContactBackend> contacts_;
 
   mutable std::mutex names_mutex_;  ///< protects names_
   ObstacleNames names_;

@@ -12,7 +12,13 @@ constexpr auto kPollInterval = std::chrono::milliseconds(5);
 
 /// The search always uses the exact method, whatever the method of the rendering. The clearance keeps the
 /// result strictly feasible, so that a proxy can follow from it.
-constexpr PenetrationDepth::Options kSearchOptions = {Method::exact, 47, Proxy::kClearance_m};
+PenetrationDepth::Options search_options(ContactBackend contacts) {
+  PenetrationDepth::Options options;
+  options.method = Method::exact;
+  options.clearance_m = Proxy::kClearance_m;
+  options.contacts = contacts;
+  return options;
+}
 
 ProxyInitializationResult find_feasible_pose(PenetrationDepth& penetration,
                                              const ProxyInitializationRequest& request,
@@ -37,8 +43,9 @@ const char* name(ProxyInitialization progress) noexcept {
   return "unknown";
 }
 
-BackgroundProxyInitializer::BackgroundProxyInitializer(const Scene& scene)
-    : penetration_(scene, kSearchOptions), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+BackgroundProxyInitializer::BackgroundProxyInitializer(const Scene& scene, ContactBackend contacts)
+    : penetration_(scene, search_options(contacts)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void BackgroundProxyInitializer::run(const std::stop_token& stop) noexcept {
   ProxyInitializationRequest request;
@@ -51,18 +58,20 @@ void BackgroundProxyInitializer::run(const std::stop_token& stop) noexcept {
 }
 
 std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const Scene> scene,
-                                                         ProxySearchMode mode) {
+                                                         ProxySearchMode mode, ContactBackend contacts) {
   const Scene& borrowed = *scene;
   // The deleter owns the scene, so that the scene outlives the initializer that refers to it.
   const auto with_scene = [&scene](auto initializer) {
     return std::shared_ptr<ProxyInitializer>(initializer.release(),
                                              [scene = std::move(scene)](ProxyInitializer* p) { delete p; });
   };
-  if (mode == ProxySearchMode::in_tick) return with_scene(std::make_unique<InTickProxyInitializer>(borrowed));
-  return with_scene(std::make_unique<BackgroundProxyInitializer>(borrowed));
+  if (mode == ProxySearchMode::in_tick)
+    return with_scene(std::make_unique<InTickProxyInitializer>(borrowed, contacts));
+  return with_scene(std::make_unique<BackgroundProxyInitializer>(borrowed, contacts));
 }
 
-InTickProxyInitializer::InTickProxyInitializer(const Scene& scene) : penetration_(scene, kSearchOptions) {}
+InTickProxyInitializer::InTickProxyInitializer(const Scene& scene, ContactBackend contacts)
+    : penetration_(scene, search_options(contacts)) {}
 
 void InTickProxyInitializer::request(const ProxyInitializationRequest& request) noexcept {
   request_ = request;

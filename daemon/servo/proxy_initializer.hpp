@@ -7,6 +7,7 @@
 
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
+#include "core/contact_backend.hpp"
 #include "core/latest_value.hpp"
 #include "core/pose.hpp"
 
@@ -63,7 +64,7 @@ enum class ProxySearchMode : std::uint8_t {
 class BackgroundProxyInitializer final : public ProxyInitializer {
  public:
   /// Starts the thread. Keeps a reference to `scene`, which must outlive this object. Not RT-safe: allocates.
-  explicit BackgroundProxyInitializer(const Scene& scene);
+  explicit BackgroundProxyInitializer(const Scene& scene, ContactBackend contacts = ContactBackend::native);
   /// Stops a running search and joins the thread. Not RT-safe: takes a few milliseconds.
   ~BackgroundProxyInitializer() override = default;
 
@@ -85,11 +86,12 @@ class BackgroundProxyInitializer final : public ProxyInitializer {
 class InTickProxyInitializer final : public ProxyInitializer {
  public:
   /// Keeps a reference to `scene`, which must outlive this object. Not RT-safe: allocates.
-  explicit InTickProxyInitializer(const Scene& scene);
+  explicit InTickProxyInitializer(const Scene& scene, ContactBackend contacts = ContactBackend::native);
 
   /// RT-safe.
   void request(const ProxyInitializationRequest& request) noexcept override;
-  /// Neither allocates nor locks. Not RT-safe: takes milliseconds, and seconds inside a fine mesh.
+  /// Neither allocates nor locks, unless CGAL detects the contacts. Not RT-safe: takes milliseconds, and
+  /// seconds inside a fine mesh.
   bool take_result(ProxyInitializationResult& result) noexcept override;
 
  private:
@@ -100,6 +102,7 @@ class InTickProxyInitializer final : public ProxyInitializer {
 
 /// Returns an initializer for `mode` that shares ownership of `scene`. Not RT-safe: allocates.
 std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const Scene> scene,
-                                                         ProxySearchMode mode);
+                                                         ProxySearchMode mode,
+                                                         ContactBackend contacts = ContactBackend::native);
 
 }  // namespace wrenchd

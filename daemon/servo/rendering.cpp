@@ -52,8 +52,8 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
-      penetration_(*scene_,
-                   {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
+      penetration_(*scene_, {settings.rendering.method, settings.rendering.planes, 0.0,
+                             settings.rendering.friction, settings.rendering.contacts}),
       law_(gains_) {
   invalidate_proxy();
 }

@@ -32,14 +32,14 @@ TimedMethod pairs_runner(const MeshPair& pair) {
 }
 
 /// Times the whole tick: contacts, projection, verification and wrench. The value is the energy.
-TimedMethod tick_runner(const MeshPair& pair) {
+TimedMethod tick_runner(const MeshPair& pair, ContactBackend contacts = ContactBackend::native) {
   struct State {
-    explicit State(const MeshPair& pair) : proxy(pair.scene), X_WQ(pair.X_start) {}
+    State(const MeshPair& pair, ContactBackend contacts) : proxy(pair.scene, contacts), X_WQ(pair.X_start) {}
     Proxy proxy;
     Pose X_WQ;
   };
-  const auto state = std::make_shared<State>(pair);
-  return {"wrenchd whole tick",
+  const auto state = std::make_shared<State>(pair, contacts);
+  return {contacts == ContactBackend::cgal ? "whole tick, contacts = cgal" : "wrenchd whole tick",
           [state, &pair] {
             state->proxy.clear_history();
             // Untimed. The hand starts at rest and moves to the first pose without a jump.
@@ -150,6 +150,11 @@ void add_unpackaged(const MeshPair& pair, std::span<const PeerModule> peers, Tab
 void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& scale,
                 std::span<const PeerModule> peers, std::size_t peers_every, Tables& tables) {
   std::vector<TimedMethod> runners = {pairs_runner(pair), tick_runner(pair)};
+  constexpr std::size_t kMaxCgalTriangles = 100000;  // beyond, its passes take too long
+  const std::size_t triangles = pair.scene.tool_mesh()->surface.triangles().size() +
+                                pair.scene.meshes()[0].mesh->surface.triangles().size();
+  const bool with_cgal = triangles <= kMaxCgalTriangles;
+  if (with_cgal) runners.push_back(tick_runner(pair, ContactBackend::cgal));
   for (const PeerModule& module : peers)
     for (TimedMethod& runner : peer_runners(pair, module)) {
       runner.every = peers_every;
@@ -158,6 +163,9 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& 
   const std::vector<MethodTiming> results = time_methods(runners, pair.X_WP.size(), effort.passes, scale);
   const MethodTiming& pairs = results[0];
   const MethodTiming& tick = results[1];
+  const auto is_tick = [&](const MethodTiming& result) {
+    return &result == &tick || (with_cgal && &result == &results[2]);
+  };
   for (const MethodTiming& result : results) {
     add_times(pair.name, result, tables.times);
     if (&result == &pairs || &result == &tick) continue;
@@ -178,7 +186,7 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& 
   for (std::size_t k = 0; k < looked_at; ++k)
     truth.push_back(static_cast<double>(exact.intersecting_pairs(pair.X_OW * pair.X_WP[k * stride])));
   for (const MethodTiming& result : results) {
-    if (&result == &tick) continue;
+    if (is_tick(result)) continue;
     std::size_t wrong = 0;
     for (std::size_t k = 0; k < looked_at; ++k) wrong += result.answers[k * stride].value != truth[k] ? 1 : 0;
     const auto [contacts_per_pose, count] = mean(result);

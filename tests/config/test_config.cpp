@@ -54,7 +54,7 @@ std::string printed(const Settings& s) {
   print(out, s.device.tool_in_handle);
   out << s.servo.rate_Hz << ' ' << int(s.servo.pacing) << int(s.servo.realtime) << ' ' << s.servo.priority
       << ' ' << s.servo.cpu << ' ' << s.servo.late_limit_s << '\n'
-      << int(s.rendering.method) << ' ' << s.rendering.planes << ' '
+      << int(s.rendering.method) << ' ' << s.rendering.planes << ' ' << int(s.rendering.contacts) << ' '
       << s.rendering.friction.static_coefficient << ' ' << s.rendering.friction.dynamic_coefficient << '\n'
       << static_cast<int>(s.wrench.law) << ' ' << s.wrench.energy_stiffness_per_s2 << '\n'
       << s.wrench.gains.stiffness << '\n'

@@ -147,6 +147,12 @@ TEST_CASE("invalid settings are rejected with location and remedy", "[config]") 
       {"[rendering.friction]\ndynamic = -0.1", "2:11", "expected a number from 0 to 5, found -0.1"},
       {"[rendering.friction]\nstatic = 0.2\ndynamic = 0.3", "3:11",
        "key 'rendering.friction.dynamic': expected no more than 'static', 0.2, found 0.3"},
+      {"[rendering]\ncontacts = \"bullet\"", "2:12",
+       "key 'rendering.contacts': expected \"native\" or \"cgal\", found \"bullet\""},
+      {"[rendering]\ncontacts = true", "2:12", "expected a string, found true"},
+      {"[rendering]\nmethod = 'planar'\ncontacts = 'cgal'", "3:12",
+       "key 'rendering.contacts': only method = \"exact\" detects contacts with CGAL; choose it, or leave "
+       "contacts out"},
       {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "tests/support/shipped_config.hpp"
 
@@ -62,7 +63,11 @@ double script_duration_s(const RunConfig& plan) {
 }
 
 GalleryRun run_gallery_scene(const std::string& name, double seconds) {
-  GalleryRun run{gallery_config(name), {}, {}};
+  return run_gallery_config(gallery_config(name), seconds);
+}
+
+GalleryRun run_gallery_config(RunConfig config, double seconds) {
+  GalleryRun run{std::move(config), {}, {}};
   VirtualRuntime virtual_run(run.config);
   const double last_s =
       seconds > 0.0 ? std::min(seconds, script_duration_s(run.config)) : script_duration_s(run.config);

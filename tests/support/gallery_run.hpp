@@ -24,6 +24,8 @@ double script_duration_s(const RunConfig& plan);
 
 /// Runs the scene, armed from the start. seconds: maximum duration; 0: the whole hand script.
 GalleryRun run_gallery_scene(const std::string& name, double seconds = 0.0);
+/// The same with a changed configuration of the scene.
+GalleryRun run_gallery_config(RunConfig config, double seconds = 0.0);
 
 /// Returns a quantity of a run. M is the frame of the tool's mesh.
 ///

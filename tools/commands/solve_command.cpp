@@ -15,6 +15,7 @@
 #include "collision/meshes/mesh_loader.hpp"
 #include "config/load_scene.hpp"
 #include "config/pose_table.hpp"
+#include "core/contact_backend.hpp"
 #include "core/friction.hpp"
 #include "daemon/option_checks.hpp"
 #include "tools/commands/subcommand.hpp"
@@ -81,6 +82,12 @@ class SolveCommand final : public Subcommand {
     solve->add_option("--planes", settings_.depth.planes, "N_delta of Eq. (40), for method planar")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
+    solve
+        ->add_option("--contacts", contacts_,
+                     "contact detection between meshes, for method exact: wrenchd's kernels, or CGAL's AABB\n"
+                     "trees with exact predicates: the same contacts, much slower")
+        ->check(CLI::IsMember({"native", "cgal"}))
+        ->capture_default_str();
     solve->add_option("--law", law_, "wrench law: Eq. (16), or the gradient of (k/2) T")
         ->check(CLI::IsMember({"pid", "energy"}))
         ->capture_default_str();
@@ -135,6 +142,7 @@ class SolveCommand final : public Subcommand {
       print_note("the obstacles move, but every pose is solved at scene time 0; use --proxy to move them");
     settings.depth.method = kMethods.at(method_);
     settings.depth.friction = parse_friction(friction_).value();
+    settings.depth.contacts = contacts_ == "cgal" ? ContactBackend::cgal : ContactBackend::native;
     settings.law = law_ == "energy" ? SpringLaw::energy : SpringLaw::pid;
     const std::vector<SolvedPose> rows = solve(scene, poses, settings);
     std::ostringstream text;
@@ -160,6 +168,7 @@ class SolveCommand final : public Subcommand {
   std::string output_ = "-";
   std::string method_ = "exact";
   std::string law_ = "pid";
+  std::string contacts_ = "native";
   std::string friction_ = "0,0";
   SolveSettings settings_;
 };

@@ -186,6 +186,18 @@ TEST_CASE("the method, the law and friction can be changed in contact", "[reconf
   CHECK(s.inactive_ticks == 0);
 }
 
+TEST_CASE("the contact detection can be changed in contact", "[reconfigurator][cgal_contacts]") {
+  Rig s;
+  s.press();
+  CHECK(s.reconfigurator().contacts() == ContactBackend::native);
+  s.reconfigurator().set_rendering(toml("[rendering]\ncontacts = \"cgal\""), "request");
+  CHECK(s.reconfigurator().contacts() == ContactBackend::cgal);
+  s.go_for(1.0);
+  CHECK(s.last.rendering_id == 1);
+  CHECK(s.force().z() > 1.0);
+  CHECK(s.inactive_ticks == 0);
+}
+
 TEST_CASE("a rejected change has no effect, and its message has the location and the remedy",
           "[reconfigurator]") {
   Rig s;
