@@ -36,10 +36,11 @@ long prove_sweeps(int ticks, std::uint64_t seed, const std::string& only) {
 
 void print(const std::string& name, const char* loop, const GalleryComparison& c) {
   std::printf(
-      "%-16s %-6s %6ld ticks %6ld in contact %6ld compared %6ld equal bits, %5ld above 1e-9 (first %ld), "
-      "largest %.1e m %.1e rad; not converged: native %ld, cgal %ld",
-      name.c_str(), loop, c.ticks, c.in_contact, c.compared, c.equal_bits, c.different, c.first_different,
-      c.largest_m, c.largest_rad, c.native_spent, c.cgal_spent);
+      "%-16s %-6s %6ld ticks %6ld in contact %6ld compared %6ld equal bits %5ld above 1e-9, largest %.1e m "
+      "%.1e rad; not converged: native %ld (first at %ld), cgal %ld",
+      name.c_str(), loop, c.ticks, c.in_contact, c.compared, c.equal_bits, c.different, c.largest_m,
+      c.largest_rad, c.native_spent, c.first_native_spent, c.cgal_spent);
+  if (c.hands_parted >= 0) std::printf("; hands part at %ld", c.hands_parted);
   if (c.cgal_p50_us > 0.0)
     std::printf("; p50 / p99.9 [us]: native %.0f / %.0f, cgal %.0f / %.0f, %.0f Hz", c.native_p50_us,
                 c.native_p999_us, c.cgal_p50_us, c.cgal_p999_us, 1e6 / c.cgal_p999_us);
@@ -70,7 +71,7 @@ int main(int argc, char** argv) {
   bool in_gallery = false;
   double seconds = 0.0;
   std::string only;
-  app.add_option("--cases", ticks, "number of ticks per scene; each tick compares four sweeps")
+  app.add_option("--cases", ticks, "number of ticks per scene; each tick compares five sweeps")
       ->check(CLI::Range(1, 100000000))
       ->capture_default_str();
   app.add_option("--seed", seed, "seed of the hand's motion and of the random paths")->capture_default_str();

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "collision/penetration.hpp"
@@ -14,7 +14,8 @@
 namespace wrenchd::test {
 namespace {
 
-constexpr double kTolerance = 1e-9;  // [m], [rad]
+constexpr double kTolerance = 1e-9;    // [m], [rad]
+constexpr double kEqualHands = 1e-11;  // [m], [rad]
 
 bool settled(std::uint8_t status) {
   return static_cast<ProjectionStatus>(status) == ProjectionStatus::converged ||
@@ -31,19 +32,23 @@ double quantile(std::vector<double> values, double fraction) {
   return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
 }
 
+/// Returns the distance of two poses: in translation [m] and in rotation [rad].
+std::pair<double, double> distance(const Pose& a, const Pose& b) {
+  const double sign = a.rotation.dot(b.rotation) < 0.0 ? -1.0 : 1.0;
+  return {(a.translation_m - b.translation_m).norm(),
+          2.0 * (a.rotation.coeffs() - sign * b.rotation.coeffs()).norm()};
+}
+
 /// Counts one tick of both runs.
 void count(long tick, std::uint8_t native_status, const Pose& X_native, std::uint8_t cgal_status,
            const Pose& X_cgal, GalleryComparison& out) {
   out.native_spent += settled(native_status) ? 0 : 1;
+  if (!settled(native_status) && out.first_native_spent < 0) out.first_native_spent = tick;
   out.cgal_spent += settled(cgal_status) ? 0 : 1;
-  if (!settled(native_status) || !settled(cgal_status)) return;
+  if (out.hands_parted >= 0 || !settled(native_status) || !settled(cgal_status)) return;
   ++out.compared;
   out.equal_bits += same_bits(X_native, X_cgal) ? 1 : 0;
-  const double away_m = (X_native.translation_m - X_cgal.translation_m).norm();
-  const double away_rad =
-      2.0 * (X_native.rotation.coeffs() -
-             X_cgal.rotation.coeffs() * (X_native.rotation.dot(X_cgal.rotation) < 0.0 ? -1.0 : 1.0))
-                .norm();
+  const auto [away_m, away_rad] = distance(X_native, X_cgal);
   out.largest_m = std::max(out.largest_m, away_m);
   out.largest_rad = std::max(out.largest_rad, away_rad);
   if (std::max(away_m, away_rad) <= kTolerance) return;
@@ -112,6 +117,9 @@ GalleryComparison compare_gallery_scene(const std::string& name, bool closed_loo
   const GalleryRun cgal = run_gallery_config(config, seconds);
   for (std::size_t i = 0; i < native.ticks.size(); ++i) {
     const TickRecord &a = native.ticks[i], &b = cgal.ticks[i];
+    const auto [hands_m, hands_rad] = distance(pose_from_numbers(a.X_WP), pose_from_numbers(b.X_WP));
+    if (out.hands_parted < 0 && std::max(hands_m, hands_rad) > kEqualHands)
+      out.hands_parted = static_cast<long>(i);
     if (proxy_valid(a) && proxy_valid(b))
       count(static_cast<long>(i), a.projection_status, pose_from_numbers(a.X_WQ), b.projection_status,
             pose_from_numbers(b.X_WQ), out);

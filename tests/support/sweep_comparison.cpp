@@ -122,7 +122,9 @@ SweepCounts compare_sweeps(const ManipulationCase& handling, int ticks, int rand
                                 X_WQ.translation_m + step_m * random.unit<3>()});
     }
     const Projection q = proxy.follow(X_WP, X_WQ);
-    if (q.status != ProjectionStatus::infeasible) X_WQ = q.X_WQ;
+    if (q.status == ProjectionStatus::infeasible) continue;
+    comparison.compare(X_WQ, q.X_WQ);  // the loaded contacts touch at its end
+    X_WQ = q.X_WQ;
   }
   return comparison.counts();
 }

@@ -47,7 +47,7 @@ class SweepComparison {
 };
 
 /// Lets a proxy follow the hand of a case for a number of ticks. From each of its poses, compares the sweep
-/// to the hand and `random_paths` sweeps of random length and direction.
+/// to the hand, the sweep to its next pose, and `random_paths` sweeps of random length and direction.
 SweepCounts compare_sweeps(const ManipulationCase& handling, int ticks, int random_paths, std::uint64_t seed);
 
 }  // namespace wrenchd::test
