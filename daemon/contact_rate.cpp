@@ -9,6 +9,8 @@ namespace wrenchd {
 namespace {
 
 constexpr double kFirstReport_s = 5.0;
+/// With this number of overruns the first report comes at once.
+constexpr std::uint64_t kManyOverruns = 20;
 constexpr double kFall = 2.0 / 3.0;
 /// Fraction of the ticks that must end before the next one is due.
 constexpr double kInTime = 0.999;
@@ -29,7 +31,8 @@ std::string ContactRateReport::start_text() {
 }
 
 std::optional<ContactRateReport::Message> ContactRateReport::check(const LoopTiming& timing) {
-  if (static_cast<double>(timing.tick.count()) < kFirstReport_s * rate_Hz_) return {};
+  const bool measured = static_cast<double>(timing.tick.count()) >= kFirstReport_s * rate_Hz_;
+  if (!measured && timing.overruns.load() < kManyOverruns) return {};
   const double allowed_Hz = allowed_rate_Hz(timing);
   if (reported_Hz_ > 0.0 && allowed_Hz > kFall * reported_Hz_) return {};
   return report(allowed_Hz);

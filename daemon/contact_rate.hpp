@@ -25,10 +25,10 @@ class ContactRateReport {
   /// Returns what to log when the loop starts.
   static std::string start_text();
 
-  /// Returns a report after the first five seconds, and whenever the rate that the scene allows has fallen
-  /// by a third since the last report. Call it now and then.
+  /// Returns a report after the ticks of five seconds or after 20 overruns, and whenever the rate that the
+  /// scene allows has fallen by a third since the last report. Call it now and then.
   std::optional<Message> check(const LoopTiming& timing);
-  /// Returns the report of a run that ended before the first five seconds.
+  /// Returns the report of a run that ended before the first report.
   std::optional<Message> close(const LoopTiming& timing);
 
  private:

@@ -49,6 +49,16 @@ TEST_CASE("a scene that allows the rate is reported without advice, and again wh
   CHECK_THAT(slow->text, Catch::Contains("a lower rate_Hz"));
 }
 
+TEST_CASE("twenty overruns are reported at once", "[contact_rate]") {
+  LoopTiming timing;
+  ContactRateReport report(1000.0);
+  add(timing, 100, 10ms);
+  timing.overruns = 19;
+  CHECK_FALSE(report.check(timing));
+  timing.overruns = 20;
+  CHECK(report.check(timing)->too_slow);
+}
+
 TEST_CASE("a short run is reported at its end", "[contact_rate]") {
   LoopTiming timing;
   ContactRateReport report(1000.0);
