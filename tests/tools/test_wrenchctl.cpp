@@ -581,6 +581,7 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{"solve", scene, poses}, "--poses is required"},
       {{"solve", scene, "--poses", poses, "--bogus"}, "--bogus"},
       {{"solve", scene, "--poses", poses, "--law", "Energy"}, "{pid,energy}"},
+      {{"solve", scene, "--poses", poses, "--contacts", "bullet"}, "bullet not in {native,cgal}"},
       {{"solve", scene, "--poses", poses, "--planes", "0"}, "--planes: Value 0 not in range 1 to 1000"},
       {{"solve", scene, "--poses", poses, "--planes", "many"}, "--planes"},
       {{"solve", scene, "--poses", poses, "--energy-stiffness", "-3"},
@@ -834,6 +835,20 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
     const double top = tool == std::string("cube") ? 0.0255 : 0.0055;
     CHECK(std::stod(column(2, 4)) == Approx(top).margin(1e-8));
     CHECK(std::stod(column(2, 4)) > top);
+    // CGAL detects the same contacts.
+    const ProgramResult reference = run_program(
+        "wrenchctl", {"solve", scene.string(), "--poses", table.string(), "--proxy", "--contacts", "cgal"});
+    CHECK(reference.exit_code == 0);
+    const std::vector<std::string> reference_rows = split(reference.out, '\n');
+    REQUIRE(reference_rows.size() >= 64);
+    for (std::size_t row = 0; row < 63; ++row) {
+      const std::vector<std::string> cells = split(reference_rows[row + 1], ',');
+      if (column(row, 28) == "iteration_limit" || cells.at(28) == "iteration_limit") continue;
+      CHECK(cells.at(28) == column(row, 28));
+      for (int i = 2; i < 9; ++i)
+        CHECK(std::stod(cells.at(static_cast<std::size_t>(i))) ==
+              Approx(std::stod(column(row, i))).margin(1e-9).epsilon(0.0));
+    }
     // Without history the opposite side is equally close.
     const ProgramResult alone =
         run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string()});
@@ -856,6 +871,11 @@ TEST_CASE("wrenchctl solve requires method exact for bodies that are not convex"
   CHECK(result.out == "");
   CHECK(result.err.find("'rack'") != std::string::npos);
   CHECK(result.err.find("only method exact") != std::string::npos);
+  const ProgramResult cgal = run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string(),
+                                                       "--method", "planar", "--contacts", "cgal"});
+  CHECK(cgal.exit_code == 1);
+  CHECK(cgal.err.find("only method exact detects contacts with CGAL; choose it, or remove") !=
+        std::string::npos);
 }
 
 /// A cube of 50 mm on a cube of 50 mm that rises by 10 mm in one second and then reverses.
