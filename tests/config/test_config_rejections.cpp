@@ -149,7 +149,7 @@ TEST_CASE("invalid settings are rejected with location and remedy", "[config]") 
        "key 'rendering.friction.dynamic': expected no more than 'static', 0.2, found 0.3"},
       {"[rendering]\ncontacts = \"bullet\"", "2:12",
        "key 'rendering.contacts': expected \"native\" or \"cgal\", found the text \"bullet\""},
-      {"[rendering]\ncontacts = true", "2:12", "expected a string, found true"},
+      {"[rendering]\ncontacts = true", "2:12", "expected \"native\" or \"cgal\", found true"},
       {"[rendering]\nmethod = 'planar'\ncontacts = 'cgal'", "3:12",
        "key 'rendering.contacts': only method = \"exact\" detects contacts with CGAL; choose it, or leave "
        "contacts out"},

@@ -20,7 +20,8 @@ struct GalleryComparison {
   long first_native_spent = -1;
   long cgal_spent = 0;
   long hands_parted = -1;  ///< closed loop: first tick whose poses p differ by more than 1e-11; -1: none
-  double cgal_p50_us = 0.0, cgal_p999_us = 0.0;  ///< duration of a tick's projection with CGAL
+  /// Open loop: processor time of a tick's projection, over the ticks in contact.
+  double cgal_p50_us = 0.0, cgal_p999_us = 0.0;
   double native_p50_us = 0.0, native_p999_us = 0.0;
 };
 

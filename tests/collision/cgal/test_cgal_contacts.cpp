@@ -118,15 +118,15 @@ TEST_CASE("both overlap tests agree, and agree with exact arithmetic", "[cgal_co
 }
 
 TEST_CASE("a body in another one, and a tool around an obstacle, overlap for CGAL too", "[cgal_contacts]") {
-  const auto overlaps = [](const char* tool, const char* obstacle) {
+  const auto overlaps = [](const GeneratedMesh& tool, const GeneratedMesh& obstacle) {
     std::vector<MeshObstacle> obstacles;
-    obstacles.push_back({"obstacle", MeshBvh(make_mesh({obstacle, 500})), Pose{}});
-    const Scene scene(mesh_tool(make_mesh({tool, 500})), {}, {}, std::move(obstacles));
+    obstacles.push_back({"obstacle", MeshBvh(make_mesh(obstacle)), Pose{}});
+    const Scene scene(mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
     return make_overlap_test(scene, ContactBackend::cgal)->overlaps(scene.meshes()[0], Pose{});
   };
-  CHECK(overlaps("bolt", "cube"));
-  CHECK(overlaps("cube", "bolt"));
-  CHECK_FALSE(overlaps("peg", "hole"));
+  CHECK(overlaps({"bolt", 500}, {"cube", 500}));
+  CHECK(overlaps({"cube", 500}, {"bolt", 500}));
+  CHECK_FALSE(overlaps({"peg", 400}, {"hole", 800}));
 }
 
 TEST_CASE("a proxy has the same poses with either contact detection", "[cgal_contacts]") {
