@@ -29,7 +29,8 @@ struct GalleryComparison {
 ///
 /// closed_loop: both runs are complete servo loops, whose hands feel their own forces. After a tick in which
 /// the kernels defer work the hands take different paths, so their proxies cannot be compared. Otherwise two
-/// proxies follow the poses p of one run. seconds: maximum duration; 0: the whole hand script.
+/// proxies without work limit follow the poses p of one run. seconds: maximum duration; 0: the whole hand
+/// script.
 GalleryComparison compare_gallery_scene(const std::string& name, bool closed_loop, double seconds = 0.0);
 
 }  // namespace wrenchd::test
