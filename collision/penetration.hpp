@@ -48,7 +48,6 @@ class PenetrationDepth {
     Proxy::WorkLimit work_limit = {};  ///< work limit of one tick of a followed proxy
     /// What detects contacts between meshes. With ContactBackend::cgal no member is RT-safe.
     ContactBackend contacts = ContactBackend::native;
-    Proxy::WorkLimit work_limit = {};  ///< work limit of one tick of a followed proxy
   };
 
   /// Keeps a reference to the scene, which must outlive this object. Throws std::invalid_argument if the

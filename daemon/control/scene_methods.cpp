@@ -280,20 +280,19 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
 }
 
 void add_rendering_methods(MethodTable& table, Reconfigurator& reconfigurator) {
-  table.add(
-      MethodRow{"rendering.set",
-                Role::operator_,
-                {{"rendering", ParamType::object, false,
-                  "keys of [rendering] in wrenchd.toml: method, contacts, friction, ..."},
-                 {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
-                "Changes the contact method and the wrench law. Other keys keep their values.",
-                [&reconfigurator](const Json& params, const Caller&) {
-                  return with_rpc_errors([&] {
-                    reconfigurator.set_rendering(toml_of(params), "rendering.set");
-                    return MethodResult(current_rendering(reconfigurator));
-                  });
-                },
-                true});
+  table.add(MethodRow{
+      "rendering.set",
+      Role::operator_,
+      {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, contacts, friction, ..."},
+       {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
+      "Changes the contact method and the wrench law. Other keys keep their values.",
+      [&reconfigurator](const Json& params, const Caller&) {
+        return with_rpc_errors([&] {
+          reconfigurator.set_rendering(toml_of(params), "rendering.set");
+          return MethodResult(current_rendering(reconfigurator));
+        });
+      },
+      true});
 }
 
 void add_workspace_methods(MethodTable& table, Reconfigurator& reconfigurator) {
