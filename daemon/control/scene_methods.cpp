@@ -283,7 +283,7 @@ void add_rendering_methods(MethodTable& table, Reconfigurator& reconfigurator) {
   table.add(MethodRow{
       "rendering.set",
       Role::operator_,
-      {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, contacts, friction, ..."},
+      {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, contacts, ..."},
        {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
       "Changes the contact method and the wrench law. Other keys keep their values.",
       [&reconfigurator](const Json& params, const Caller&) {

@@ -53,7 +53,7 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
       penetration_(*scene_, {settings.rendering.method, settings.rendering.planes, 0.0,
-                             settings.rendering.friction, settings.rendering.contacts}),
+                             settings.rendering.friction, Proxy::WorkLimit{}, settings.rendering.contacts}),
       law_(gains_) {
   invalidate_proxy();
 }
