@@ -18,6 +18,7 @@ TOOL = f"{ROOT}/tools/mutation"
 sys.path.insert(0, TOOL)
 sys.dont_write_bytecode = True
 
+import cases  # noqa: E402
 import explained  # noqa: E402
 import operators  # noqa: E402
 
@@ -148,6 +149,21 @@ class Explanations(unittest.TestCase):
             explained.read_explanations("file: a.cpp\nline: x;\nmutation: *\n")
         with self.assertRaises(explained.Stale):
             explained.read_explanations(self.ENTRY.format("*") + "because: of that\n")
+
+
+class Slices(unittest.TestCase):
+    def test_a_slice_runs_each_of_its_cases_and_is_red_if_none_runs(self):
+        # Catch2 runs only what matches every word of its command line, but any of the names between commas.
+        case = lambda name: cases.TestCase(name, "echo_tests", ("", name.replace(",", "\\,")), "/", "tests/test_toy.cpp")
+        with tempfile.TemporaryDirectory() as scratch:
+            program = f"{scratch}/echo_tests"
+            with open(program, "w") as file:
+                file.write("#!/bin/sh\nprintf '<%s>' \"$@\"\n")
+            os.chmod(program, 0o755)
+            outcome = cases.run_cases([case("one"), case("two, three")], program, 10, scratch)
+        self.assertFalse(outcome.red)
+        self.assertTrue(outcome.words.startswith("<one,two\\, three>"), outcome.words)
+        self.assertIn("<-w><NoTests>", outcome.words)
 
 
 TREE = {
