@@ -90,7 +90,7 @@ TEST_CASE("wrenchd's kernels and CGAL meet the same contacts", "[cgal_contacts]"
   }
   CHECK(all.largest_difference == 0.0);
   CHECK(all.sweeps > case_count(6000));
-  CHECK(all.contacts > case_count(8000));
+  CHECK(all.contacts > case_count(5000));
   CHECK(all.touching > case_count(50));
 }
 
