@@ -61,7 +61,8 @@ MeshContacts::SweepResult MeshContacts::sweep(const Pose& X_WT, double clearance
   feature_margin_m_ = sweep_tolerance::kBorder * clearance_m + arc_deviation_m_;
   slope_tolerance_ = sweep_tolerance::kSlope;
   test_pairs(budget, result);
-  if (result.overlaps && crossings_.empty()) {
+  if (result.overlaps && crossings_.empty() &&
+      displacement_bound_m_ <= sweep_tolerance::kWideBorderPath * scene_.tool_radius_m()) {
     feature_margin_m_ = sweep_tolerance::kWideBorder * displacement_bound_m_;
     slope_tolerance_ = sweep_tolerance::kAnySlope;
     test_pairs(budget, result);
@@ -355,11 +356,11 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
   if (closes) {
     if (!edges_touch(view, pass, crossing_fraction, feature_margin_m_)) return;
   } else if (open || !edges_touch(view, pass, 1.0, sweep_tolerance::kTouch * clearance_m_)) {
-    // The edges separated again. If they overlapped deeply before, the tool met other features unnoticed: the
-    // path is too long.
+    // The edges separated again. If they overlapped deeply before, the path is too long.
     const double curvature = g_start - 2.0 * g_middle + g_end;
     const double lowest = curvature > 0.0 ? (g_start * g_end - g_middle * g_middle) / curvature : 0.0;
-    if (lowest < -feature_margin_m_ * std::max(s_start, s_end) &&
+    const double dip_m = std::max(feature_margin_m_, sweep_tolerance::kDip * displacement_bound_m_);
+    if (lowest < -dip_m * std::max(s_start, s_end) &&
         edges_touch(view, pass, crossing_fraction, feature_margin_m_))
       result.overlaps = true;
     return;

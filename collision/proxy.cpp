@@ -183,11 +183,9 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
       deferred_ = true;
       break;
     }
-    if (!reaches_optimum) {
-      if (all_kept && fraction == 1.0) longest_m *= kStepGrowth;  // a long free path
-      continue;
-    }
-    if (all_kept) return finish(X_WP, q);
+    if (all_kept && reaches_optimum) return finish(X_WP, q);
+    if (all_kept && fraction == 1.0) longest_m *= kStepGrowth;  // a long free path
+    if (!reaches_optimum && fraction < 1.0) continue;
     const double T = energy(M_, X_WP, X_WQ_);
     if (T > (1.0 - kMinDecrease) * T_last) return finish(X_WP, q);
     T_last = T;

@@ -34,10 +34,18 @@ constexpr double kStart = 0.5;
 constexpr double kSlope = 1e-3;
 /// If the end pose overlaps but no crossing was found, crossings missed a feature's border narrowly. The
 /// sweep then repeats the feature tests with this tolerance, as a fraction of the path, and ignores slopes.
+/// It does so on paths of at most this length, as a fraction of the tool's radius: on a longer path the
+/// tolerance would reach features that the tool passes, for example the face beside a narrow hole. The caller
+/// shortens longer paths.
 constexpr double kWideBorder = 0.05;
+constexpr double kWideBorderPath = 1e-4;
 constexpr double kAnySlope = 2.0;
 /// Up to this rotation [rad] arc and chord differ by less than 1e-5 of the tool's size.
 constexpr double kNegligibleRotation_rad = 5e-3;
+/// Two edges may overlap on the path by this depth, as a fraction of the path, and separate again on the side
+/// from which they came. Such a dip of second order, METHOD (95), passes nothing. A deeper one makes the path
+/// too long.
+constexpr double kDip = 1e-3;
 /// Sine of the angle below which two edges have no usable normal.
 constexpr double kParallel = 1e-7;
 

@@ -17,10 +17,9 @@ constexpr double kListFactor = 0.9;
 /// The work limit as a multiple of the target. With a lower limit, lists are deferred so often that they cost
 /// more.
 constexpr double kLimitFactor = 2.0;
-/// The limit is never lower than this [node visits], about 30 us.
-constexpr double kMinLimit_visits = 250.0;
-/// The lower bound of the limit before the first estimate [node visits], a fraction of a millisecond.
-constexpr double kInitialLimit_visits = 3000.0;
+/// The limit is never lower than this [node visits], 0.5 to 0.8 ms. A deferral leaves the proxy behind the
+/// hand for a tick, so only work that endangers the period is deferred.
+constexpr double kMinLimit_visits = 7000.0;
 /// If work is deferred over several ticks, the hand moves on and the paths become longer. For each deferred
 /// tick beyond kToleratedDeferrals the limit grows by the fraction kGrowthPerDeferral. A tick without
 /// deferral reduces the count by the factor kDecay.
@@ -46,9 +45,8 @@ double WorkBalancer::target_visits() const noexcept {
 }
 
 std::uint32_t WorkBalancer::max_visits(double urgency) const noexcept {
-  const double min_limit = ticks_ > 0.0 ? kMinLimit_visits : kInitialLimit_visits;
   const double growth = 1.0 + kGrowthPerDeferral * std::max(recent_deferrals_ - kToleratedDeferrals, 0.0);
-  const double limit = std::max(kLimitFactor * target_visits(), min_limit) * growth * urgency;
+  const double limit = std::max(kLimitFactor * target_visits(), kMinLimit_visits) * growth * urgency;
   return static_cast<std::uint32_t>(std::min(limit, kMaxLimit_visits));
 }
 

@@ -53,7 +53,8 @@ SweepQuery::SweepResult CgalContacts::sweep(const Pose& X_WT, double clearance_m
   feature_margin_m_ = kBorder * clearance_m + arc_deviation_m_;
   slope_tolerance_ = kSlope;
   test_all_pairs(result);
-  if (result.overlaps && crossings_.empty()) {
+  if (result.overlaps && crossings_.empty() &&
+      displacement_bound_m_ <= kWideBorderPath * scene_.tool_radius_m()) {
     feature_margin_m_ = kWideBorder * displacement_bound_m_;
     slope_tolerance_ = kAnySlope;
     test_all_pairs(result);
@@ -291,12 +292,11 @@ void CgalContacts::test_edges(const ObstacleView& view, const MovedTriangle& a, 
     return;
   }
   if (closes) return;
-  // The edges separated again. If they overlapped deeply before, the tool met other features unnoticed: the
-  // path is too long.
+  // The edges separated again. If they overlapped deeply before, the path is too long.
   const double curvature = g[0] - 2.0 * g[1] + g[2];
   const double lowest = curvature > 0.0 ? (g[0] * g[2] - g[1] * g[1]) / curvature : 0.0;
-  if (lowest < -feature_margin_m_ * std::max(s_start, s_end) &&
-      edges_touch(pass, pass.sign, fraction, feature_margin_m_))
+  const double dip_m = std::max(feature_margin_m_, kDip * displacement_bound_m_);
+  if (lowest < -dip_m * std::max(s_start, s_end) && edges_touch(pass, pass.sign, fraction, feature_margin_m_))
     result.overlaps = true;
 }
 

@@ -6,19 +6,27 @@
 #include <memory>
 #include <numbers>
 
+#include "collision/meshes/mesh_loader.hpp"
 #include "tests/support/conforming_scene.hpp"
 #include "tests/support/manipulation_case.hpp"
 
 namespace wrenchd::bench {
 namespace {
 
+/// The scene holds the surfaces that the daemon would use.
 MeshPair made_pair(const GeneratedMesh& tool, const GeneratedMesh& obstacle) {
+  const double tolerance_m = SceneSettings{}.surface_tolerance_m;
+  MeshLoader loader;
   ToolBody body = test::mesh_tool(make_mesh(tool));
   const auto tool_T = std::make_shared<const MeshBvh>(body.mesh);
   const auto obstacle_O = std::make_shared<const MeshBvh>(make_mesh(obstacle));
-  std::vector<MeshObstacle> obstacles = {{obstacle.kind, obstacle_O, Pose{}}};
-  return {"", Scene(std::move(body), {}, {}, std::move(obstacles), tool_T), tool_T, obstacle_O, {}, {}, {},
-          {}};
+  auto tool_surface = loader.build_bvh(body.mesh, BodyKind::solid, tool.kind, tolerance_m);
+  auto obstacle_surface = loader.build_bvh(make_mesh(obstacle), BodyKind::solid, obstacle.kind, tolerance_m);
+  std::vector<MeshObstacle> obstacles = {{obstacle.kind, std::move(obstacle_surface), Pose{}}};
+  return {"",     Scene(std::move(body), {}, {}, std::move(obstacles), std::move(tool_surface)),
+          tool_T, obstacle_O,
+          {},     {},
+          {},     {}};
 }
 
 /// Returns the pair of a scene that was loaded from files, without poses.

@@ -13,16 +13,22 @@ WorkBalancer after(int ticks, std::uint32_t sweep_visits, double list) {
 }
 
 TEST_CASE("the work limit is a small multiple of the usual work", "[work_balancer]") {
-  const WorkBalancer work = after(200, 300, 700.0);
-  CHECK(work.typical_sweep_visits() == Approx(300.0));
-  CHECK(work.max_visits(1.0) > 1500);
-  CHECK(work.max_visits(1.0) <= 4000);
+  const WorkBalancer work = after(200, 3000, 7000.0);
+  CHECK(work.typical_sweep_visits() == Approx(3000.0));
+  CHECK(work.max_visits(1.0) > 15'000);
+  CHECK(work.max_visits(1.0) <= 40'000);
+}
+
+TEST_CASE("work that fits the period is never deferred", "[work_balancer]") {
+  CHECK(WorkBalancer().max_visits(1.0) >= 5000);
+  CHECK(after(200, 5, 2.0).max_visits(1.0) >= 5000);
+  CHECK(after(200, 5, 2.0).max_visits(1.0) <= 10'000);
 }
 
 TEST_CASE("one expensive tick changes the estimate little", "[work_balancer]") {
-  WorkBalancer work = after(200, 300, 700.0);
+  WorkBalancer work = after(200, 3000, 7000.0);
   const std::uint32_t before = work.max_visits(1.0);
-  work.update(3000, 700.0, false);
+  work.update(30'000, 7000.0, false);
   CHECK(work.max_visits(1.0) < before * 1.2);
 }
 
@@ -36,28 +42,27 @@ TEST_CASE("a lasting increase of the cost soon becomes the usual cost", "[work_b
 
 TEST_CASE("a tool at rest may move immediately: the cost of lists counts, not that of rest",
           "[work_balancer]") {
-  CHECK(after(10000, 1, 1700.0).max_visits(1.0) > 2500);
+  CHECK(after(10000, 1, 17'000.0).max_visits(1.0) > 25'000);
 }
 
-TEST_CASE("small work and a fast hand are never limited", "[work_balancer]") {
-  CHECK(after(200, 5, 2.0).max_visits(1.0) >= 100);
-  const WorkBalancer work = after(200, 300, 700.0);
+TEST_CASE("the limit grows with the urgency, so a fast hand is never limited", "[work_balancer]") {
+  const WorkBalancer work = after(200, 3000, 7000.0);
   CHECK(work.max_visits(10.0) == 10 * work.max_visits(1.0));
   CHECK(work.max_visits(1e30) > 1'000'000);
 }
 
 TEST_CASE("consecutive deferrals raise the limit, and later ticks lower it again", "[work_balancer]") {
-  WorkBalancer work = after(200, 300, 700.0);
+  WorkBalancer work = after(200, 3000, 7000.0);
   const std::uint32_t before = work.max_visits(1.0);
-  for (int i = 0; i < 3; ++i) work.update(300, 700.0, true);
+  for (int i = 0; i < 3; ++i) work.update(3000, 7000.0, true);
   CHECK(work.max_visits(1.0) <= 1.01 * before);  // a slow hand tolerates this delay
-  for (int i = 0; i < 4; ++i) work.update(300, 700.0, true);
+  for (int i = 0; i < 4; ++i) work.update(3000, 7000.0, true);
   const std::uint32_t after_some = work.max_visits(1.0);
   CHECK(after_some > 1.2 * before);
-  for (int i = 0; i < 100; ++i) work.update(300, 700.0, true);
+  for (int i = 0; i < 100; ++i) work.update(3000, 7000.0, true);
   CHECK(work.max_visits(1.0) > 1.5 * after_some);  // the proxy does not fall behind permanently
   CHECK(work.max_visits(1.0) < 6.0 * before);
-  for (int i = 0; i < 50; ++i) work.update(300, 700.0, false);
+  for (int i = 0; i < 50; ++i) work.update(3000, 7000.0, false);
   CHECK(work.max_visits(1.0) <= 1.01 * before);
 }
 
