@@ -220,38 +220,47 @@ template <class AtStart, class AtEnd>
 std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass(
     const MeshSurface& face_body, std::uint32_t triangle, const MeshSurface& vertex_body,
     std::uint32_t vertex, const AtStart& at_start, const AtEnd& at_end) const noexcept {
-  const bool two_sided = face_body.kind() == MeshSurface::Kind::surface;
   const MeshSurface::Plane& front = face_body.planes()[triangle];
+  auto pass = vertex_pass_on_side(front, face_body, triangle, vertex_body, vertex, at_start, at_end);
+  if (pass || face_body.kind() == MeshSurface::Kind::solid) return pass;
+  const MeshSurface::Plane back = {-front.normal, -front.offset_m};
+  return vertex_pass_on_side(back, face_body, triangle, vertex_body, vertex, at_start, at_end);
+}
+
+/// Tests a vertex against one side of a face. side: plane of the face with the normal towards the vertex.
+template <class AtStart, class AtEnd>
+std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
+    const MeshSurface::Plane& side, const MeshSurface& face_body, std::uint32_t triangle,
+    const MeshSurface& vertex_body, std::uint32_t vertex, const AtStart& at_start,
+    const AtEnd& at_end) const noexcept {
   const Vector3d& p_body = vertex_body.vertices_m()[vertex];
   const Vector3d p_end = at_end(p_body);
-  double end_m = front.normal.dot(p_end) - front.offset_m;
-  if (!two_sided && end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_) return {};
+  const double end_m = side.normal.dot(p_end) - side.offset_m;
+  if (end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_) return {};
   const Vector3d p_start = at_start(p_body);
-  double start_m = front.normal.dot(p_start) - front.offset_m;
+  const double start_m = side.normal.dot(p_start) - side.offset_m;
+  if (start_m < -sweep_tolerance::kStart * clearance_m_) return {};
   VertexPass pass;
-  pass.plane = front;
-  if (two_sided && start_m < 0.0) {
-    pass.plane = {-front.normal, -front.offset_m};
-    start_m = -start_m;
-    end_m = -end_m;
-  }
-  if (end_m > (1.0 + sweep_tolerance::kClosing) * clearance_m_ ||
-      start_m < -sweep_tolerance::kStart * clearance_m_)
-    return {};
+  pass.plane = side;
   pass.closes = closes(start_m, end_m);
   pass.path_fraction = pass.closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
   pass.p = interpolate(p_start, p_end, pass.path_fraction);
   if (!projects_inside(pass.p, face_body.corner_m(triangle, 0), face_body.corner_m(triangle, 1),
-                       face_body.corner_m(triangle, 2), front.normal,
+                       face_body.corner_m(triangle, 2), face_body.planes()[triangle].normal,
                        pass.closes ? feature_margin_m_ : sweep_tolerance::kTouch * clearance_m_))
     return {};
-  // Any features may surround a vertex of a surface.
-  if (vertex_body.kind() == MeshSurface::Kind::surface) return pass;
-  for (const std::uint32_t neighbour : vertex_body.ring_of(vertex)) {
+  const auto ring = vertex_body.ring_of(vertex);
+  double rise = 0.0;  // sum of the slopes to the neighbours
+  for (const std::uint32_t neighbour : ring) {
     const Vector3d& q_body = vertex_body.vertices_m()[neighbour];
     const Vector3d q = interpolate(at_start(q_body), at_end(q_body), pass.path_fraction);
-    if (!(pass.plane.normal.dot(q - pass.p) >= -slope_tolerance_ * (q_body - p_body).norm())) return {};
+    const double length_m = (q_body - p_body).norm(), height_m = side.normal.dot(q - pass.p);
+    if (!(height_m >= -slope_tolerance_ * length_m)) return {};
+    rise += height_m / length_m;
   }
+  // If slopes are ignored, their sum still shows on which side of a surface the body lies.
+  const bool behind = rise < -sweep_tolerance::kSlope * static_cast<double>(ring.size());
+  if (behind && face_body.kind() == MeshSurface::Kind::surface) return {};
   return pass;
 }
 
@@ -319,16 +328,12 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
   const double s_start = N_start.norm(), s_end = N_end.norm();
   const double parallel = sweep_tolerance::kParallel * pass.da_end.norm() * pass.db.norm();
   if (!(s_start > parallel) || !(s_end > parallel)) return;
-  // Outward is away from both faces of the obstacle and towards those of the tool.
   const Vector3d w_start = pass.a0_start - pass.b0, w_end = pass.a0_end - pass.b0;
-  bool becomes_parallel = false;  // the edges become parallel on the path
-  if (surface.kind() == MeshSurface::Kind::surface) {
-    pass.sign = N_start.dot(w_start) < 0.0 ? -1.0 : 1.0;
-  } else {
-    const Vector3d out = surface.planes()[eb.triangles[0]].normal + surface.planes()[eb.triangles[1]].normal;
-    pass.sign = N_end.dot(out) < 0.0 ? -1.0 : 1.0;
-    becomes_parallel = N_start.dot(out) * pass.sign <= 0.0;
-  }
+  const OutwardPath outward =
+      outward_path(surface, eb, tool, tool.convex_edges()[edge_a], view, N_start * N_start.dot(w_start));
+  pass.sign = N_end.dot(outward.end) < 0.0 ? -1.0 : 1.0;
+  // True if the edges become parallel on the path.
+  const bool becomes_parallel = N_start.dot(outward.start) * pass.sign <= 0.0;
   const double f_start = pass.sign * N_start.dot(w_start), f_end = pass.sign * N_end.dot(w_end);
   const double f_middle = 0.5 * pass.sign * (N_start.dot(w_end) + N_end.dot(w_start));
   if (becomes_parallel) {
@@ -370,7 +375,7 @@ void MeshContacts::edge_on_edge(const ObstacleView& view, const MovedTriangle& a
   add_contact(closes, crossing_fraction, view.X_WO * pass.p, contact);
 }
 
-/// Returns true if the edges lie opposite each other at this path fraction and all four faces fall away from
+/// Returns true if the edges lie opposite each other at this path fraction and all their faces fall away from
 /// the plane between them. Sets pass.p to the contact point.
 bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, double fraction,
                                double tolerance_m) const noexcept {
@@ -390,12 +395,11 @@ bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, d
   const auto falls_away = [&](const Vector3d& height_of, double side) {
     return side * n.dot(height_of) >= -slope_tolerance_ * height_of.norm();
   };
-  if (surface.kind() == MeshSurface::Kind::solid)
-    for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
-      for (int k = 0; k < 3; ++k)
-        if (!falls_away(surface.corner_m(t, k) - pass.b0, -1.0)) return false;
+  for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
+    for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k)
+      if (!falls_away(surface.corner_m(t, k) - pass.b0, -1.0)) return false;
   for (const std::uint32_t t : tool.convex_edges()[pass.edge_a].triangles)
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k) {
       const Vector3d& p_T = tool.corner_m(t, k);
       if (!falls_away(interpolate(view.X_OT_start * p_T, view.X_OT_end * p_T, fraction) - a0, 1.0))
         return false;

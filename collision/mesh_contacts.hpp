@@ -100,6 +100,11 @@ class MeshContacts final : public SweepQuery {
   std::optional<VertexPass> vertex_pass(const MeshSurface& face_body, std::uint32_t triangle,
                                         const MeshSurface& vertex_body, std::uint32_t vertex,
                                         const AtStart& at_start, const AtEnd& at_end) const noexcept;
+  template <class AtStart, class AtEnd>
+  std::optional<VertexPass> vertex_pass_on_side(const MeshSurface::Plane& side, const MeshSurface& face_body,
+                                                std::uint32_t triangle, const MeshSurface& vertex_body,
+                                                std::uint32_t vertex, const AtStart& at_start,
+                                                const AtEnd& at_end) const noexcept;
   void vertices_on_face(const ObstacleView& view, const CandidatePair& pair) noexcept;
   void face_on_vertices(const ObstacleView& view, const CandidatePair& pair) noexcept;
   void edges_on_edges(const ObstacleView& view, const CandidatePair& pair, const MovedTriangle& a,

@@ -62,6 +62,18 @@ Contact edge_edge_contact(const ObstacleView& view, const MeshSurface& tool, std
   return contact;
 }
 
+OutwardPath outward_path(const MeshSurface& obstacle, const MeshSurface::Edge& edge_b,
+                         const MeshSurface& tool, const MeshSurface::Edge& edge_a, const ObstacleView& view,
+                         const Vector3d& from_b_at_start) noexcept {
+  if (!edge_b.is_border()) {
+    const Vector3d out = obstacle.outward(edge_b);
+    return {out, out};
+  }
+  if (edge_a.is_border()) return {from_b_at_start, from_b_at_start};
+  const Vector3d into = -tool.outward(edge_a);
+  return {view.X_OT_start.R * into, view.X_OT_end.R * into};
+}
+
 CrossingList::CrossingList() {
   crossings_.reserve(kMaxCrossings);
 }

@@ -94,6 +94,20 @@ Contact face_vertex_contact(const ObstacleView& view, const MeshSurface& tool, s
 Contact edge_edge_contact(const ObstacleView& view, const MeshSurface& tool, std::uint32_t edge_a,
                           std::uint32_t edge_b, double sign, const Vector3d& n_O) noexcept;
 
+/// A direction out of the obstacle at both ends of the path, in O. Not of unit length. The normal of a
+/// contact of two edges has a positive component along it.
+struct OutwardPath {
+  Vector3d start, end;
+};
+
+/// Returns the direction for an edge of the obstacle and an edge of the tool. Between two faces the direction
+/// is the middle of the sector from which the edge is convex. At a border the normal may lie on either side
+/// of the face, so the edge of the tool decides. If both edges are borders, the result is from_b_at_start.
+/// That vector points from the obstacle's edge to the tool's at the start of the path. RT-safe.
+OutwardPath outward_path(const MeshSurface& obstacle, const MeshSurface::Edge& edge_b,
+                         const MeshSurface& tool, const MeshSurface::Edge& edge_a, const ObstacleView& view,
+                         const Vector3d& from_b_at_start) noexcept;
+
 /// A pair of features that the path crosses.
 struct Crossing {
   double path_fraction;  ///< position on the path: 0 at the start, 1 at the end

@@ -211,28 +211,43 @@ std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass(
     const MeshSurface& face_body, std::uint32_t triangle, const MeshSurface& vertex_body,
     std::uint32_t vertex, const AtStart& at_start, const AtEnd& at_end) const {
   const MeshSurface::Plane& front = face_body.planes()[triangle];
+  const auto pass = vertex_pass_on_side(front, face_body, triangle, vertex_body, vertex, at_start, at_end);
+  if (pass || face_body.kind() == MeshSurface::Kind::solid) return pass;
+  const MeshSurface::Plane back = {-front.normal, -front.offset_m};
+  return vertex_pass_on_side(back, face_body, triangle, vertex_body, vertex, at_start, at_end);
+}
+
+/// Tests a vertex against one side of a face. side: plane of the face with the normal towards the vertex.
+template <class AtStart, class AtEnd>
+std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass_on_side(
+    const MeshSurface::Plane& side, const MeshSurface& face_body, std::uint32_t triangle,
+    const MeshSurface& vertex_body, std::uint32_t vertex, const AtStart& at_start,
+    const AtEnd& at_end) const {
   const Vector3d& p_body = vertex_body.vertices_m()[vertex];
   const Vector3d p_start = at_start(p_body), p_end = at_end(p_body);
-  MeshSurface::Plane plane = front;
-  if (face_body.kind() == MeshSurface::Kind::surface && exact::side_of_plane(front, 0.0, p_start) < 0)
-    plane = {-front.normal, -front.offset_m};
-  if (exact::side_of_plane(plane, (1.0 + kClosing) * clearance_m_, p_end) > 0) return {};
-  if (exact::side_of_plane(plane, -kStart * clearance_m_, p_start) < 0) return {};
-  VertexPass pass = {plane, false, 1.0, p_end};
-  pass.closes = exact::side_of_plane(plane, (1.0 - kClosing) * clearance_m_, p_end) < 0 &&
-                !exact::rises(plane.normal, p_end - p_start, kClosing * clearance_m_);
+  if (exact::side_of_plane(side, (1.0 + kClosing) * clearance_m_, p_end) > 0) return {};
+  if (exact::side_of_plane(side, -kStart * clearance_m_, p_start) < 0) return {};
+  VertexPass pass = {side, false, 1.0, p_end};
+  pass.closes = exact::side_of_plane(side, (1.0 - kClosing) * clearance_m_, p_end) < 0 &&
+                !exact::rises(side.normal, p_end - p_start, kClosing * clearance_m_);
   if (pass.closes)
-    pass.path_fraction = closing_time(height_m(plane, p_start), height_m(plane, p_end), clearance_m_);
+    pass.path_fraction = closing_time(height_m(side, p_start), height_m(side, p_end), clearance_m_);
   pass.p_m = interpolate(p_start, p_end, pass.path_fraction);
-  if (!exact::projects_inside(pass.p_m, triangle_of(face_body, triangle), front.normal,
+  if (!exact::projects_inside(pass.p_m, triangle_of(face_body, triangle), face_body.planes()[triangle].normal,
                               pass.closes ? feature_margin_m_ : kTouch * clearance_m_))
     return {};
-  if (vertex_body.kind() == MeshSurface::Kind::surface) return pass;
-  for (const std::uint32_t neighbour : vertex_body.ring_of(vertex)) {
+  const auto ring = vertex_body.ring_of(vertex);
+  double rise = 0.0;  // sum of the slopes to the neighbours
+  for (const std::uint32_t neighbour : ring) {
     const Vector3d& q_body = vertex_body.vertices_m()[neighbour];
     const Vector3d q = interpolate(at_start(q_body), at_end(q_body), pass.path_fraction);
-    if (!exact::rises(plane.normal, q - pass.p_m, slope_tolerance_ * (q_body - p_body).norm())) return {};
+    const double length_m = (q_body - p_body).norm();
+    if (!exact::rises(side.normal, q - pass.p_m, slope_tolerance_ * length_m)) return {};
+    rise += side.normal.dot(q - pass.p_m) / length_m;
   }
+  // If slopes are ignored, their sum still shows on which side of a surface the body lies.
+  const bool behind = rise < -kSlope * static_cast<double>(ring.size());
+  if (behind && face_body.kind() == MeshSurface::Kind::surface) return {};
   return pass;
 }
 
@@ -260,14 +275,10 @@ void CgalContacts::test_edges(const ObstacleView& view, const MovedTriangle& a, 
   const double s_start = N_start.norm(), s_end = N_end.norm();
   const double parallel = kParallel * pass.end.da.norm() * db.norm();
   if (!(s_start > parallel) || !(s_end > parallel)) return;
-  bool becomes_parallel = false;
-  if (surface.kind() == MeshSurface::Kind::surface) {
-    pass.sign = exact::compare_gap(pass.start, 0.0) < 0 ? -1.0 : 1.0;
-  } else {
-    const Vector3d out = surface.planes()[eb.triangles[0]].normal + surface.planes()[eb.triangles[1]].normal;
-    pass.sign = exact::rises(out, N_end) ? 1.0 : -1.0;
-    becomes_parallel = exact::rises(out, -pass.sign * N_start);
-  }
+  const OutwardPath out =
+      outward_path(surface, eb, tool, ea, view, N_start * exact::compare_gap(pass.start, 0.0));
+  pass.sign = exact::rises(out.end, N_end) ? 1.0 : -1.0;
+  const bool becomes_parallel = exact::rises(out.start, -pass.sign * N_start);
   pass.start.sign = pass.end.sign = pass.sign;
   double f[3];
   gap_polynomial(pass.start, pass.end, pass.sign, f);
@@ -312,7 +323,7 @@ bool CgalContacts::passes_parallel(const EdgePass& pass, const double (&f)[3],
          edges_touch(pass, -pass.sign, before, feature_margin_m_);
 }
 
-/// Returns true if the edges lie opposite each other at this path fraction and all four faces fall away from
+/// Returns true if the edges lie opposite each other at this path fraction and all their faces fall away from
 /// the plane between them. point_O_m: receives the contact point.
 bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fraction, double tolerance_m,
                                Vector3d* point_O_m) const {
@@ -330,12 +341,11 @@ bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fractio
   const auto falls_away = [&](const Vector3d& from_edge, double side) {
     return exact::rises(side * n, from_edge, slope_tolerance_ * from_edge.norm());
   };
-  if (surface.kind() == MeshSurface::Kind::solid)
-    for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
-      for (int k = 0; k < 3; ++k)
-        if (!falls_away(surface.corner_m(t, k) - at.b0, -1.0)) return false;
+  for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
+    for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k)
+      if (!falls_away(surface.corner_m(t, k) - at.b0, -1.0)) return false;
   for (const std::uint32_t t : tool.convex_edges()[pass.edge_a].triangles)
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k) {
       const Vector3d& p_T = tool.corner_m(t, k);
       if (!falls_away(interpolate(pass.view.X_OT_start * p_T, pass.view.X_OT_end * p_T, fraction) - at.a0,
                       1.0))

@@ -78,6 +78,11 @@ class CgalContacts final : public SweepQuery {
   std::optional<VertexPass> vertex_pass(const MeshSurface& face_body, std::uint32_t triangle,
                                         const MeshSurface& vertex_body, std::uint32_t vertex,
                                         const AtStart& at_start, const AtEnd& at_end) const;
+  template <class AtStart, class AtEnd>
+  std::optional<VertexPass> vertex_pass_on_side(const MeshSurface::Plane& side, const MeshSurface& face_body,
+                                                std::uint32_t triangle, const MeshSurface& vertex_body,
+                                                std::uint32_t vertex, const AtStart& at_start,
+                                                const AtEnd& at_end) const;
   void test_edges(const ObstacleView& view, const MovedTriangle& a, std::uint32_t edge_a,
                   std::uint32_t edge_b, SweepResult& result);
   bool passes_parallel(const EdgePass& pass, const double (&f)[3], double parallel_fraction) const;

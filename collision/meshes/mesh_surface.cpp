@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -17,6 +18,9 @@ constexpr double kCoplanar = 1e-10;
 constexpr double kMaxCoplanar_m = 1e-10;
 /// A vertex is convex only if its neighbours fall away by at least this angle [rad].
 constexpr double kMinFallAngle_rad = 1e-7;
+/// Two faces of a surface whose wedge is narrower than this angle [rad] lie on each other. Their edge then
+/// acts as a border.
+constexpr double kMinWedge = 1e-3;
 
 constexpr int next(int i) noexcept {
   return i == 2 ? 0 : i + 1;
@@ -51,15 +55,16 @@ bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& firs
 MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)), kind_(kind) {
   for (const Vector3d& p : mesh_.vertices_m) radius_m_ = std::max(radius_m_, p.norm());
   features_.assign(mesh_.triangles.size(), {{kNone, kNone, kNone}, {kNone, kNone, kNone}});
-  find_neighbours();
+  const std::vector<CrowdedEdge> crowded = find_neighbours();
   find_planes();
-  find_convex_edges();
+  find_convex_edges(crowded);
   find_convex_vertices();
 }
 
-/// Pairs a side from a to b with a side from b to a. Sides stay unpaired unless there is exactly one of each
-/// direction.
-void MeshSurface::find_neighbours() {
+/// Pairs the two sides at each edge. In a solid one goes from a to b and the other from b to a; the two faces
+/// of a surface may be wound against each other. All other sides stay unpaired. Returns the edges of three or
+/// more faces of a surface.
+std::vector<MeshSurface::CrowdedEdge> MeshSurface::find_neighbours() {
   struct TriangleHalfEdge {
     std::uint64_t key;  ///< both vertices, the smaller number first
     std::uint32_t triangle;
@@ -78,18 +83,37 @@ void MeshSurface::find_neighbours() {
     return std::pair(a.key, a.triangle) < std::pair(b.key, b.triangle);
   });
   neighbours_.assign(mesh_.triangles.size(), {kNone, kNone, kNone});
+  std::vector<CrowdedEdge> crowded;
   for (std::size_t i = 0; i < half_edges.size();) {
     std::size_t end = i + 1;
     while (end < half_edges.size() && half_edges[end].key == half_edges[i].key) ++end;
-    if (end - i == 2 && half_edges[i].forward != half_edges[i + 1].forward) {
+    if (end - i == 2 && (kind_ == Kind::surface || half_edges[i].forward != half_edges[i + 1].forward)) {
       neighbours_[half_edges[i].triangle][half_edges[i].side] = half_edges[i + 1].triangle;
       neighbours_[half_edges[i + 1].triangle][half_edges[i + 1].side] = half_edges[i].triangle;
     }
+    if (end - i > 2 && kind_ == Kind::surface) {
+      crowded.emplace_back();
+      for (std::size_t k = i; k < end; ++k)
+        crowded.back().push_back({half_edges[k].triangle, half_edges[k].side});
+    }
     i = end;
   }
+  return crowded;
 }
 
-/// Grows flat regions from the largest remaining triangle. All triangles of a region take its plane.
+/// Returns true if the neighbour across a side traverses that side in the opposite direction, as in a
+/// consistently oriented mesh.
+bool MeshSurface::is_wound_alike(TriangleSide side, std::uint32_t other) const noexcept {
+  const Corners& corners = mesh_.triangles[side.triangle];
+  const std::uint32_t from = corners[side.side], to = corners[static_cast<std::size_t>(next(side.side))];
+  for (int k = 0; k < 3; ++k)
+    if (mesh_.triangles[other][static_cast<std::size_t>(k)] == from)
+      return mesh_.triangles[other][static_cast<std::size_t>(next(k))] != to;
+  return true;
+}
+
+/// Grows flat regions from the largest remaining triangle. All triangles of a region take its plane. A
+/// triangle that is wound against the first one takes the plane with the opposite normal.
 void MeshSurface::find_planes() {
   const std::size_t count = mesh_.triangles.size();
   std::vector<Vector3d> area_normals(count);
@@ -108,23 +132,28 @@ void MeshSurface::find_planes() {
   planes_.resize(count);
   planar_region_.assign(count, kNone);
   std::vector<std::uint32_t> front;
+  std::vector<bool> reversed(count, false);  // wound against the first triangle of its region
   for (const std::uint32_t seed : largest_first) {
     if (planar_region_[seed] != kNone) continue;
     const Vector3d normal = area_normals[seed].normalized();
     const Plane plane = {normal, normal.dot(corner_m(seed, 0))};
-    const auto lies_in_plane = [&](std::uint32_t t) {
+    const auto lies_in_plane = [&](std::uint32_t t, bool turned) {
       for (int i = 0; i < 3; ++i)
         if (!(std::abs(normal.dot(corner_m(t, i)) - plane.offset_m) <= flat_m)) return false;
-      return normal.dot(area_normals[t]) >= 0.0;
+      return turned ? normal.dot(area_normals[t]) <= 0.0 : normal.dot(area_normals[t]) >= 0.0;
     };
     planar_region_[seed] = seed;
     front.assign(1, seed);
     while (!front.empty()) {
       const std::uint32_t t = front.back();
       front.pop_back();
-      planes_[t] = plane;
-      for (const std::uint32_t u : neighbours_[t]) {
-        if (u == kNone || planar_region_[u] != kNone || !lies_in_plane(u)) continue;
+      planes_[t] = reversed[t] ? Plane{-plane.normal, -plane.offset_m} : plane;
+      for (std::uint8_t i = 0; i < 3; ++i) {
+        const std::uint32_t u = neighbours_[t][i];
+        if (u == kNone || planar_region_[u] != kNone) continue;
+        const bool turned = reversed[t] == is_wound_alike({t, i}, u) && kind_ == Kind::surface;
+        if (!lies_in_plane(u, turned)) continue;
+        reversed[u] = turned;
         planar_region_[u] = seed;
         front.push_back(u);
       }
@@ -132,34 +161,99 @@ void MeshSurface::find_planes() {
   }
 }
 
-/// Returns true if the face across this side falls away: its far corner lies below the plane.
-bool MeshSurface::is_convex_edge(std::uint32_t triangle, int side) const noexcept {
-  const std::uint32_t other = neighbours_[triangle][static_cast<std::size_t>(side)];
-  if (other == kNone) return true;
-  if (planar_region_[other] == planar_region_[triangle]) return false;
-  if (kind_ == Kind::surface) return true;
-  const Plane& plane = planes_[triangle];
+/// Returns the height of the corner of the face across a side that is farthest from the plane of the triangle
+/// [m]. Negative: the face falls away.
+double MeshSurface::height_beyond_m(TriangleSide side, std::uint32_t other) const noexcept {
+  const Plane& plane = planes_[side.triangle];
   double height_m = 0.0;
   for (int i = 0; i < 3; ++i) {
     const double h = plane.normal.dot(corner_m(other, i)) - plane.offset_m;
     if (std::abs(h) > std::abs(height_m)) height_m = h;
   }
-  return height_m < 0.0;
+  return height_m;
 }
 
-void MeshSurface::find_convex_edges() {
+void MeshSurface::add_edge(TriangleSide side, std::uint32_t other, std::array<std::int32_t, 2> sides) {
+  const Corners& corners = mesh_.triangles[side.triangle];
+  features_[side.triangle].edges[side.side] = static_cast<std::uint32_t>(convex_edges_.size());
+  convex_edges_.push_back({{corners[side.side], corners[static_cast<std::size_t>(next(side.side))]},
+                           {side.triangle, other},
+                           sides});
+}
+
+/// Adds the edge between two faces of a surface that do not lie in one plane. It is convex seen from the side
+/// on which the other face falls away.
+void MeshSurface::add_edge_of_surface(TriangleSide side, std::uint32_t other) {
+  const std::int32_t from = height_beyond_m(side, other) < 0.0 ? 1 : -1;
+  const std::array<std::int32_t, 2> sides = {from, is_wound_alike(side, other) ? from : -from};
+  const Vector3d out = sides[0] * planes_[side.triangle].normal + sides[1] * planes_[other].normal;
+  const bool folded = out.norm() < kMinWedge;
+  add_edge(side, folded ? kNone : other, sides);
+}
+
+/// Adds an edge of three or more faces if one of the sectors between them is wider than 180 degrees. The
+/// faces beside this sector are those that a tool in it meets.
+void MeshSurface::add_crowded_edge(const CrowdedEdge& faces) {
+  const Corners& corners = mesh_.triangles[faces[0].triangle];
+  const Vector3d& origin = mesh_.vertices_m[corners[faces[0].side]];
+  const Vector3d along =
+      (mesh_.vertices_m[corners[static_cast<std::size_t>(next(faces[0].side))]] - origin).normalized();
+  /// A face as a half-line in the plane perpendicular to the edge.
+  struct Ray {
+    double angle;
+    Vector3d direction;
+    TriangleSide face;
+  };
+  std::vector<Ray> rays;
+  Vector3d x = Vector3d::Zero(), y = Vector3d::Zero();
+  for (const TriangleSide& face : faces) {
+    const Vector3d apex = corner_m(face.triangle, next(next(face.side))) - origin;
+    const Vector3d direction = (apex - along.dot(apex) * along).normalized();
+    if (rays.empty()) x = direction, y = along.cross(direction);
+    rays.push_back({std::atan2(y.dot(direction), x.dot(direction)), direction, face});
+  }
+  std::stable_sort(rays.begin(), rays.end(), [](const Ray& a, const Ray& b) { return a.angle < b.angle; });
+  std::size_t widest = 0;
+  double sector = 0.0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const double to_next = k + 1 < rays.size() ? rays[k + 1].angle - rays[k].angle
+                                               : rays[0].angle + 2.0 * std::numbers::pi - rays[k].angle;
+    if (to_next > sector) sector = to_next, widest = k;
+  }
+  if (sector < std::numbers::pi + kMinFallAngle_rad) return;
+  const Ray *first = &rays[widest], *second = &rays[(widest + 1) % rays.size()];
+  if (second->face.triangle < first->face.triangle) std::swap(first, second);
+  const auto side_of = [&](const Ray& ray, const Ray& other) -> std::int32_t {
+    return planes_[ray.face.triangle].normal.dot(other.direction) < 0.0 ? 1 : -1;
+  };
+  const bool folded = sector > 2.0 * std::numbers::pi - kMinWedge;
+  add_edge(first->face, folded ? kNone : second->face.triangle,
+           {side_of(*first, *second), side_of(*second, *first)});
+}
+
+/// The triangle with the smaller number owns the edge between two.
+void MeshSurface::find_convex_edges(const std::vector<CrowdedEdge>& crowded) {
+  std::vector<bool> is_crowded(crowded.empty() ? 0 : 3 * mesh_.triangles.size(), false);
+  for (const CrowdedEdge& faces : crowded)
+    for (const TriangleSide& face : faces) is_crowded[std::size_t{3} * face.triangle + face.side] = true;
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
-    for (int i = 0; i < 3; ++i) {
-      const auto side = static_cast<std::size_t>(i);
-      const std::uint32_t other = neighbours_[t][side];
-      if (other < t || !is_convex_edge(t, i)) continue;  // the triangle with the smaller number owns the edge
-      features_[t].edges[side] = static_cast<std::uint32_t>(convex_edges_.size());
-      const Corners& corners = mesh_.triangles[t];
-      convex_edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
+    for (std::uint8_t i = 0; i < 3; ++i) {
+      const std::uint32_t other = neighbours_[t][i];
+      if (other == kNone) {
+        if (crowded.empty() || !is_crowded[std::size_t{3} * t + i]) add_edge({t, i}, kNone, {1, 1});
+        continue;
+      }
+      if (other < t || planar_region_[other] == planar_region_[t]) continue;
+      if (kind_ == Kind::surface)
+        add_edge_of_surface({t, i}, other);
+      else if (height_beyond_m({t, i}, other) < 0.0)
+        add_edge({t, i}, other, {1, 1});
     }
+  for (const CrowdedEdge& faces : crowded) add_crowded_edge(faces);
 }
 
-/// At a convex vertex at least three convex edges meet: the edges of the cone that its neighbours span.
+/// At a convex vertex at least three convex edges meet: the edges of the cone that its neighbours span. At
+/// the border of a surface the cone may be flat and have two.
 void MeshSurface::find_convex_vertices() {
   const std::size_t count = mesh_.vertices_m.size();
   std::vector<std::uint32_t> sharp_edges(count, 0);
@@ -175,15 +269,15 @@ void MeshSurface::find_convex_vertices() {
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
     for (const std::uint32_t v : mesh_.triangles[t]) at[fill[v]++] = t;
 
+  const std::uint32_t least_edges = kind_ == Kind::solid ? 3 : 2;
   ring_begin_.assign(count + 1, 0);
   std::vector<std::uint32_t> neighbours;
   std::vector<Vector3d> directions;
   for (std::uint32_t v = 0; v < count; ++v) {
     ring_begin_[v + 1] = ring_begin_[v];
-    if (begin[v] == begin[v + 1] || (kind_ == Kind::solid && sharp_edges[v] < 3)) continue;
-    if (sharp_edges[v] == 0) continue;
+    if (begin[v] == begin[v + 1] || sharp_edges[v] < least_edges) continue;
     neighbours.clear();
-    Vector3d mean_normal = Vector3d::Zero();
+    Vector3d mean_normal = Vector3d::Zero(), back = Vector3d::Zero();
     for (std::uint32_t k = begin[v]; k < begin[v + 1]; ++k) {
       mean_normal += planes_[at[k]].normal;
       for (const std::uint32_t corner : mesh_.triangles[at[k]])
@@ -192,9 +286,12 @@ void MeshSurface::find_convex_vertices() {
     std::sort(neighbours.begin(), neighbours.end());
     neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
     directions.clear();
-    for (const std::uint32_t n : neighbours)
+    for (const std::uint32_t n : neighbours) {
       directions.push_back((mesh_.vertices_m[n] - mesh_.vertices_m[v]).normalized());
-    if (kind_ == Kind::solid && !all_fall_away(directions, mean_normal.normalized())) continue;
+      back -= directions.back();
+    }
+    const Vector3d& first_guess = kind_ == Kind::solid ? mean_normal : back;
+    if (!all_fall_away(directions, first_guess.normalized())) continue;
     const std::uint32_t owner = at[begin[v]];
     for (std::size_t i = 0; i < 3; ++i)
       if (mesh_.triangles[owner][i] == v) features_[owner].vertices[i] = v;

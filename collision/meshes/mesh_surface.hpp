@@ -20,8 +20,14 @@ namespace wrenchd {
 /// on a saddle) follow after another contact. They never hold a contact. So a face of a thousand triangles
 /// behaves like one face.
 ///
-/// A mesh that is open or intersects itself has no inside. It is a surface with two sides, and all its edges
-/// and vertices count as convex. Construction is not RT-safe: it may take seconds. Accessors are RT-safe.
+/// A mesh that is open or intersects itself has no inside. It is a surface with two sides, and a tool may be
+/// on either of them. The faces at an edge divide the space around it into sectors. Only a tool in a sector
+/// of more than 180 degrees can meet the edge first, so an edge is convex seen from at most one sector. The
+/// rule also holds at the border (one face), at edges of three or more faces, and where the faces are wound
+/// against each other. A vertex of a surface is convex if a plane through it leaves all its neighbours on one
+/// side, whichever side that is: core/METHOD.md, section 14.3.
+///
+/// Construction is not RT-safe: it may take seconds. Accessors are RT-safe.
 class MeshSurface {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
@@ -34,9 +40,14 @@ class MeshSurface {
   };
   struct Edge {
     std::array<std::uint32_t, 2> vertices;
-    /// The faces at the edge. The first one traverses it from vertices[0] to vertices[1]. The second is kNone
-    /// at the border of a surface.
+    /// The two faces beside the sector from which the edge is convex. The first one traverses the edge from
+    /// vertices[0] to vertices[1]. The second is kNone at the border of a surface, and where all faces lie on
+    /// each other.
     std::array<std::uint32_t, 2> triangles;
+    /// +1 or -1 for each face: the factor that turns its plane's normal into that sector. 1 for a solid.
+    std::array<std::int32_t, 2> sides;
+
+    bool is_border() const noexcept { return triangles[1] == kNone; }
   };
   /// The features that a triangle owns. Each convex vertex and each convex edge has one owner, so that each
   /// pair of features occurs in one pair of triangles only. kNone: no feature.
@@ -65,6 +76,12 @@ class MeshSurface {
   std::span<const std::uint32_t> ring_of(std::uint32_t vertex) const noexcept {
     return std::span(ring_).subspan(ring_begin_[vertex], ring_begin_[vertex + 1] - ring_begin_[vertex]);
   }
+  /// Returns a vector, not of unit length, from a convex edge to the middle of the sector from which it is
+  /// convex. Precondition: not a border edge. RT-safe.
+  Vector3d outward(const Edge& edge) const noexcept {
+    return edge.sides[0] * planes_[edge.triangles[0]].normal +
+           edge.sides[1] * planes_[edge.triangles[1]].normal;
+  }
   /// Returns the region of a triangle. Adjacent coplanar triangles have the same region. RT-safe.
   std::uint32_t planar_region(std::uint32_t triangle) const noexcept { return planar_region_[triangle]; }
 
@@ -81,16 +98,26 @@ class MeshSurface {
 
  private:
   using Corners = std::array<std::uint32_t, 3>;
+  struct TriangleSide {
+    std::uint32_t triangle;
+    std::uint8_t side;  ///< the side from corner `side` to the next corner
+  };
+  /// The sides at an edge of three or more faces.
+  using CrowdedEdge = std::vector<TriangleSide>;
 
-  void find_neighbours();
+  std::vector<CrowdedEdge> find_neighbours();
   void find_planes();
-  void find_convex_edges();
+  void find_convex_edges(const std::vector<CrowdedEdge>& crowded);
   void find_convex_vertices();
-  bool is_convex_edge(std::uint32_t triangle, int side) const noexcept;
+  bool is_wound_alike(TriangleSide side, std::uint32_t other) const noexcept;
+  double height_beyond_m(TriangleSide side, std::uint32_t other) const noexcept;
+  void add_edge(TriangleSide side, std::uint32_t other, std::array<std::int32_t, 2> sides);
+  void add_edge_of_surface(TriangleSide side, std::uint32_t other);
+  void add_crowded_edge(const CrowdedEdge& faces);
 
   TriangleMesh mesh_;
   Kind kind_ = Kind::solid;
-  /// neighbour across the side from corner i to corner i + 1; kNone: no neighbour
+  /// neighbour across the side from corner i to corner i + 1; kNone: no neighbour, or more than one
   std::vector<Corners> neighbours_;
   std::vector<Plane> planes_;
   std::vector<std::uint32_t> planar_region_;  ///< number of the triangle that defines the region's plane

@@ -17,10 +17,11 @@ namespace {
 using namespace wrenchd;
 using namespace wrenchd::test;
 
-long prove_sweeps(int ticks, std::uint64_t seed, const std::string& only) {
+long prove_sweeps(int ticks, std::uint64_t seed, const std::string& only, BodyKind kind) {
   constexpr int kRandomPaths = 3;
   SweepCounts all;
-  for (const ManipulationCase& handling : manipulation_cases()) {
+  for (ManipulationCase handling : manipulation_cases()) {
+    handling.obstacle_kind = kind;
     if (handling.name.find(only) == std::string::npos) continue;
     const SweepCounts n = compare_sweeps(handling, ticks, kRandomPaths, seed);
     std::printf("%-42s %8ld sweeps %8ld crossed %8ld contacts %7ld touching %6ld overlaps %5ld different\n",
@@ -83,7 +84,11 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--only", only, "runs only scenes whose name contains this text");
+  bool surfaces = false;
+  app.add_flag("--surface", surfaces, "the obstacles are surfaces instead of solids");
   CLI11_PARSE(app, argc, argv);
-  const long violations = in_gallery ? prove_gallery(seconds, only) : prove_sweeps(ticks, seed, only);
+  const long violations =
+      in_gallery ? prove_gallery(seconds, only)
+                 : prove_sweeps(ticks, seed, only, surfaces ? BodyKind::surface : BodyKind::solid);
   return violations == 0 ? 0 : 1;
 }

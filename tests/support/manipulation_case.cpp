@@ -44,7 +44,8 @@ ToolBody mesh_tool(TriangleMesh mesh, double mass_kg) {
 
 Scene scene_of(const ManipulationCase& handling, const ObstacleMotion& motion) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({handling.obstacle.kind, MeshBvh(make_mesh(handling.obstacle)), Pose{}, motion});
+  obstacles.push_back({handling.obstacle.kind, MeshBvh(make_mesh(handling.obstacle), handling.obstacle_kind),
+                       Pose{}, motion});
   return Scene(mesh_tool(make_mesh(handling.tool)), {}, {}, std::move(obstacles));
 }
 

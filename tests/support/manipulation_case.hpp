@@ -25,6 +25,7 @@ struct ManipulationCase {
   GeneratedMesh tool, obstacle;
   HandMotion motion;
   Vector3d start_m;  ///< start position of the tool, without overlap
+  BodyKind obstacle_kind = BodyKind::solid;
 };
 
 /// Twenty cases: thin and thick, flat and round, fine and coarse, loose and tight.

@@ -78,9 +78,11 @@ TEST_CASE("a point projects into a triangle, on its border, or beyond", "[cgal_c
 // The main test: two implementations that share the definition of a contact and no search.
 TEST_CASE("wrenchd's kernels and CGAL meet the same contacts", "[cgal_contacts]") {
   constexpr int kRandomPaths = 3;
+  const BodyKind kind = GENERATE(BodyKind::solid, BodyKind::surface);
   SweepCounts all;
-  for (const ManipulationCase& handling : manipulation_cases()) {
-    INFO(handling.name);
+  for (ManipulationCase handling : manipulation_cases()) {
+    handling.obstacle_kind = kind;
+    INFO(handling.name << (kind == BodyKind::surface ? ", as a surface" : ""));
     // A tool that is shaken begins beside the obstacle and reaches it later.
     const int ticks = handling.motion == HandMotion::shake ? 150 : 40;
     const SweepCounts counts = compare_sweeps(handling, case_count(ticks), kRandomPaths, 7);

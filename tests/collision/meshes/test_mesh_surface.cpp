@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <set>
 
 #include <catch2/catch.hpp>
@@ -70,10 +73,116 @@ TEST_CASE("the bottom of a groove has neither a convex edge nor a convex vertex"
     CHECK_FALSE((std::abs(middle.x() - 1) < 1e-9 && std::abs(middle.z() - 1) < 1e-9 &&
                  std::abs(middle.y() - 0.5) < 0.4));
   }
-  // A surface has two sides, and all features count that are not inside a flat region.
+  // A surface has two sides. The inner edge is convex seen from inside; its ends are convex from no side.
   const MeshSurface skin(angle_iron(), Kind::surface);
-  CHECK(convex_vertex_count(skin) == 12);
+  CHECK(convex_vertex_count(skin) == 10);
   CHECK(length_of_edges(skin) == Approx(2 * 8.0 + 6 * 1.0));
+}
+
+TEST_CASE("a closed mesh as a surface has the convex features of the solid and those seen from inside",
+          "[mesh_surface]") {
+  for (const char* kind : {"cube", "bumpy", "gear", "hole"}) {
+    const TriangleMesh mesh = make_mesh({kind, 2000});
+    const MeshSurface solid(mesh, Kind::solid), surface(mesh, Kind::surface);
+    std::map<std::array<std::uint32_t, 2>, MeshSurface::Edge> edges;
+    for (const auto& edge : surface.convex_edges()) edges.insert({edge.vertices, edge});
+    std::size_t common = 0;
+    for (const auto& edge : solid.convex_edges()) {
+      REQUIRE(edges.count(edge.vertices) == 1);
+      const MeshSurface::Edge& same = edges.at(edge.vertices);
+      CHECK(same.triangles == edge.triangles);
+      CHECK(surface.outward(same) == solid.outward(edge));
+      ++common;
+    }
+    // Edges that are convex from inside: their outward direction points into the solid.
+    for (const auto& edge : surface.convex_edges()) common -= edge.sides[0] > 0 ? 1 : 0;
+    CHECK(common == 0);
+    for (std::uint32_t v = 0; v < mesh.vertices_m.size(); ++v)
+      if (!solid.ring_of(v).empty()) CHECK(surface.ring_of(v).size() == solid.ring_of(v).size());
+  }
+}
+
+/// Rectangles that share the edge from (0, 0, 0) to (0, 1, 0), one in each direction given by its angle in
+/// the x-z plane.
+MeshSurface fan(const std::vector<double>& angles) {
+  TriangleMesh mesh;
+  mesh.vertices_m = {{0, 0, 0}, {0, 1, 0}};
+  for (const double angle : angles) {
+    const auto a = static_cast<std::uint32_t>(mesh.vertices_m.size());
+    const Vector3d out(std::cos(angle), 0.0, std::sin(angle));
+    mesh.vertices_m.push_back(out);
+    mesh.vertices_m.push_back(out + Vector3d::UnitY());
+    if (a % 4 == 0)  // every second one is wound the other way
+      mesh.triangles.insert(mesh.triangles.end(), {{0, 1, a}, {1, a + 1, a}});
+    else
+      mesh.triangles.insert(mesh.triangles.end(), {{1, 0, a}, {1, a, a + 1}});
+  }
+  return MeshSurface(mesh, Kind::surface);
+}
+
+TEST_CASE("an edge of a surface is convex seen from its sector of more than 180 degrees", "[mesh_surface]") {
+  const auto common_edge = [](const MeshSurface& surface) {
+    std::vector<MeshSurface::Edge> found;
+    for (const auto& edge : surface.convex_edges())
+      if (edge.vertices[0] < 2 && edge.vertices[1] < 2) found.push_back(edge);
+    return found;
+  };
+  const double degree = std::numbers::pi / 180.0;
+  struct Case {
+    std::vector<double> degrees;
+    double outward;  ///< direction of the middle of the wide sector [degrees]
+    bool convex, border;
+  };
+  for (const Case& c : std::vector<Case>{{{0}, 180, true, true},
+                                         {{0, 90}, 225, true, false},
+                                         {{0, 270}, 135, true, false},
+                                         {{0, 179}, 269.5, true, false},
+                                         {{0, 180}, 0, false, false},
+                                         {{0, 180, 270}, 0, false, false},
+                                         {{0, 120, 240}, 0, false, false},
+                                         {{0, 40, 110}, 235, true, false},
+                                         {{40, 110, 0}, 235, true, false},
+                                         {{0, 30, 60, 90}, 225, true, false},
+                                         {{0, 90, 180, 270}, 0, false, false}}) {
+    std::vector<double> angles;
+    for (const double angle : c.degrees) angles.push_back(angle * degree);
+    const MeshSurface surface = fan(angles);
+    const auto found = common_edge(surface);
+    INFO(c.degrees.size() << " faces, the second at " << c.degrees.back());
+    REQUIRE(found.size() == (c.convex ? 1 : 0));
+    if (!c.convex) continue;
+    CHECK(found[0].is_border() == c.border);
+    CHECK(surface.triangles()[found[0].triangles[0]][0] < 2);
+    if (c.border) continue;
+    const Vector3d middle(std::cos(c.outward * degree), 0.0, std::sin(c.outward * degree));
+    CHECK(surface.outward(found[0]).normalized().isApprox(middle, 1e-9));
+  }
+}
+
+TEST_CASE("a flat region of a surface has no interior features, however it is wound", "[mesh_surface]") {
+  TriangleMesh mesh;
+  constexpr std::uint32_t n = 6;
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t j = 0; j <= n; ++j) mesh.vertices_m.emplace_back(0.1 * i, 0.1 * j, 0.0);
+  RandomValues random(5);
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  for (auto& corners : mesh.triangles)
+    if (random.chance(0.5)) std::swap(corners[1], corners[2]);
+  const MeshSurface surface(mesh, Kind::surface);
+  CHECK(length_of_edges(surface) == Approx(4 * 0.6));
+  for (const auto& edge : surface.convex_edges()) CHECK(edge.is_border());
+  CHECK(convex_vertex_count(surface) == 4);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    CHECK(surface.planar_region(t) == surface.planar_region(0));
+    const Vector3d area = (surface.corner_m(t, 1) - surface.corner_m(t, 0))
+                              .cross(surface.corner_m(t, 2) - surface.corner_m(t, 0));
+    CHECK(surface.planes()[t].normal.dot(area) > 0.0);  // the plane follows the winding of its triangle
+  }
 }
 
 TEST_CASE("every convex vertex and every convex edge has one owner triangle, and lies in it",
