@@ -46,8 +46,10 @@ constexpr double kMinClearance = 0.2;
 constexpr std::uint16_t kMaxTrappedTicks = 50;
 /// A displacement by obstacles has no step limit.
 constexpr ExactProjection::StepLimit kNoStepLimit = {};
-/// Minimum relative decrease of T per round; the tick ends below it.
+/// Minimum relative decrease of T per round. Below it the round made no progress.
 constexpr double kMinDecrease = 1e-9;
+/// The tick ends after this number of rounds without progress in sequence.
+constexpr int kMaxIdleRounds = 3;
 
 /// Returns true if all contacts are open at a pose, to half the clearance.
 bool all_open(std::span<const ActiveContact> contacts, const Pose& X_WT) noexcept {
@@ -139,6 +141,7 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
   X_last_WP_ = X_WP;
   double fraction = first_step_fraction_;  // fraction of the longest step
   double T_last = energy(M_, X_WP, X_WQ_);
+  int idle_rounds = 0;
   while (sweeps_ < work_limit_.sweeps && fraction >= kMinFraction) {
     const Projection q = step(X_WP, fraction * longest_m);
     // The known contacts may contradict each other where others would not.
@@ -187,20 +190,34 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
     if (all_kept && fraction == 1.0) longest_m *= kStepGrowth;  // a long free path
     if (!reaches_optimum && fraction < 1.0) continue;
     const double T = energy(M_, X_WP, X_WQ_);
-    if (T > (1.0 - kMinDecrease) * T_last) return finish(X_WP, q);
+    const bool idle = T > (1.0 - kMinDecrease) * T_last;
+    idle_rounds = idle ? idle_rounds + 1 : 0;
     T_last = T;
+    if (!idle) continue;
+    // Either the contacts that remain balance the pull, or the next round may find the one that is missing.
+    const Projection held = held_answer(X_WP);
+    if (held.status == ProjectionStatus::converged || all_kept || idle_rounds == kMaxIdleRounds) return held;
   }
   return unfinished_answer(X_WP);
 }
 
-/// Returns the pose reached so far.
-Projection Proxy::unfinished_answer(const Pose& X_WP) const noexcept {
+/// Returns the present pose with the known contacts. The status is converged if they balance the pull.
+Projection Proxy::held_answer(const Pose& X_WP) noexcept {
   Projection q;
-  q.status =
-      trapped_ticks_ < kMaxTrappedTicks ? ProjectionStatus::budget_spent : ProjectionStatus::infeasible;
   q.X_WQ = X_WQ_;
   q.active = known_contacts_;
+  exact_.balance(X_WP, q);
+  q.status =
+      q.kkt_residual <= kOptimalResidual ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
   return finish(X_WP, q);
+}
+
+/// Returns the pose reached so far.
+Projection Proxy::unfinished_answer(const Pose& X_WP) noexcept {
+  Projection q = held_answer(X_WP);
+  q.status =
+      trapped_ticks_ < kMaxTrappedTicks ? ProjectionStatus::budget_spent : ProjectionStatus::infeasible;
+  return q;
 }
 
 /// Displaces the proxy while the obstacles move to their poses at time_s, in several parts if necessary.

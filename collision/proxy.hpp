@@ -87,7 +87,8 @@ class Proxy {
   PathResult sweep_along(const Pose& X_WT, double time_s) noexcept;
   bool add_known_contact(Contact contact) noexcept;
   bool drop_separated_contacts(const Projection& q) noexcept;
-  Projection unfinished_answer(const Pose& X_WP) const noexcept;
+  Projection held_answer(const Pose& X_WP) noexcept;
+  Projection unfinished_answer(const Pose& X_WP) noexcept;
   Projection finish(const Pose& X_WP, Projection q) const noexcept;
 
   const Scene& scene_;

@@ -96,10 +96,7 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   const bool free_at_p = load_known_contacts(known);
   iterations_ = 0;
   touching_added_ = false;
-  step_start_.E = relative_rotation(X_start.rotation);
-  step_start_.R = step_start_.E.toRotationMatrix();
-  step_start_.u = X_WP.rotation.conjugate() * (X_start.translation_m - X_WP.translation_m) / L_;
-  step_start_.T = scaled_energy(step_start_);
+  step_start_ = to_iterate(X_start);
   step_limit_ = limit;
   state_ = Iterate{};
   if (free_at_p && !exceeds_step_limit(state_)) {
@@ -141,6 +138,29 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   }
   step_limit_ = StepLimit{};
   return make_projection(local);
+}
+
+/// With z0 = -g and the rows J_i . z >= 0 the answer of (31) is z = -g + sum multiplier_i J_i.
+void ExactProjection::balance(const Pose& X_WP, Projection& q) noexcept {
+  X_WP_ = X_WP;
+  load_known_contacts({q.active.begin(), q.active.end()});
+  state_ = to_iterate(q.X_WQ);
+  linearise(state_);
+  const Vector6d g = gradient(state_);
+  newton_problem_.clear();
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (gap_[i] <= kTouching) newton_problem_.add(J_[i], 0.0);
+  using Status = LeastDistance<6, ContactSet::kCapacity>::Status;
+  const bool solved = newton_problem_.solve(-g, kGapTolerance) == Status::optimal;
+  q.active.clear();
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    const bool touches = gap_[i] <= kTouching;
+    multiplier_[i] = touches && solved ? newton_problem_.multiplier(row) : 0.0;
+    row += touches ? 1 : 0;
+    q.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});
+  }
+  q.kkt_residual = residual(g);
 }
 
 /// True if a state is beyond the step limit.
@@ -215,6 +235,16 @@ void ExactProjection::begin_query(const Pose& X_WP, const ContactSource& scene) 
 
 Quaterniond ExactProjection::relative_rotation(const Quaterniond& R_WT) const noexcept {
   return (X_WP_.rotation.conjugate() * R_WT).normalized();
+}
+
+/// Returns a pose in scaled coordinates.
+ExactProjection::Iterate ExactProjection::to_iterate(const Pose& X_WT) const noexcept {
+  Iterate state;
+  state.E = relative_rotation(X_WT.rotation);
+  state.R = state.E.toRotationMatrix();
+  state.u = X_WP_.rotation.conjugate() * (X_WT.translation_m - X_WP_.translation_m) / L_;
+  state.T = scaled_energy(state);
+  return state;
 }
 
 /// Solves without history, from the contacts that p violates.
@@ -497,7 +527,8 @@ ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool scen
     const bool rounding = residual_ > 0.5 * before_short_step && residual_ <= kRoundedResidual;
     const bool converged = residual_ <= kSmallResidual || rounding;
     if (converged || iterations_ == iteration_limit_ || at_step_limit_) {
-      const LocalResult local = converged ? LocalResult::converged : LocalResult::budget_spent;
+      const LocalResult local =
+          residual_ <= kOptimalResidual ? LocalResult::converged : LocalResult::budget_spent;
       if (scene_asked || (all_gaps_open() && add_touching_contacts(state))) return local;
       if (!restore_admissibility(state) && !project_translation_or_rotate(state))
         return LocalResult::infeasible;
@@ -525,9 +556,7 @@ ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool scen
     }
     linearise(state);  // contacts may have been dropped
     residual_ = residual(gradient(state));
-    // Rounding hides a decrease of T below its last digits.
-    return stepped && predicted_decrease <= 1e-13 * state.T ? LocalResult::converged
-                                                            : LocalResult::budget_spent;
+    return residual_ <= kOptimalResidual ? LocalResult::converged : LocalResult::budget_spent;
   }
 }
 

@@ -16,12 +16,16 @@
 namespace wrenchd {
 
 enum class ProjectionStatus : std::uint8_t {
-  free,       ///< the pose is admissible: q = p
-  converged,  ///< q is a closest admissible configuration (a KKT point)
+  free,  ///< the pose is admissible: q = p
+  /// q is a closest admissible configuration: a KKT point with a residual of at most kOptimalResidual
+  converged,
   /// q is admissible, and the best configuration within the iteration budget or the step limit
   budget_spent,
   infeasible,  ///< no admissible pose was found near p: the obstacles contradict each other here
 };
+
+/// Largest KKT residual of a projection of the exact method with the status converged, METHOD (42).
+inline constexpr double kOptimalResidual = 1e-6;
 
 /// A contact that touches at q, with its multiplier.
 struct ActiveContact {
@@ -35,7 +39,8 @@ struct Projection {
   double energy = 0.0;  ///< T = d(p, q) of Eq. (8) [kg m^2]
   ProjectionStatus status = ProjectionStatus::free;
   std::uint16_t iterations = 0;  ///< number of Newton steps
-  /// KKT residual |grad T - sum multiplier grad gap| / |grad T| at q, METHOD (42), in scaled units.
+  /// KKT residual |grad T - sum multiplier grad gap| / |grad T| at q, METHOD (42), in scaled units: the part
+  /// of the pull on q that no contact balances. 0 if p is admissible, 1 if no contact touches.
   double kkt_residual = 0.0;
   /// True if project_globally() proved that no admissible pose is closer. project() never sets it.
   bool proven_global = false;
@@ -92,6 +97,11 @@ class ExactProjection {
   Projection step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
                   const StepLimit& limit) noexcept;
 
+  /// Sets the multipliers of the contacts in q.active to those that make the KKT residual at q.X_WQ least,
+  /// METHOD (44a), and sets q.kkt_residual. Contacts that do not touch at q.X_WQ get the multiplier 0.
+  /// RT-safe.
+  void balance(const Pose& X_WP, Projection& q) noexcept;
+
   /// The closest admissible configuration to p, without history. Tries further starts until the dual
   /// certificate proves the result optimal or no start is left. Usually the first start is proven, and the
   /// query takes as long as project(); otherwise up to a hundred times as long. Allocates nothing. Not
@@ -119,6 +129,7 @@ class ExactProjection {
 
   void begin_query(const Pose& X_WP, const ContactSource& scene) noexcept;
   Quaterniond relative_rotation(const Quaterniond& R_WT) const noexcept;
+  Iterate to_iterate(const Pose& X_WT) const noexcept;
   Projection multistart() noexcept;
   Projection solve(const Quaterniond& E_start, Freedom freedom = Freedom::all) noexcept;
   bool load_known_contacts(std::span<const ActiveContact> known) noexcept;
