@@ -146,10 +146,16 @@ Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& sto
   return approximate(X_WP, X_WP);
 }
 
-/// The methods of the paper do not search the global optimum.
+/// The methods of the paper do not search the optimum. The residual tells how far from it the answer is.
 Penetration PenetrationDepth::approximate(const Pose& X_WP, const Pose& X_start) noexcept {
-  if (options_.method == Method::descent) return descend(X_WP, X_start);
-  return options_.method == Method::planar ? planar(X_WP) : translational(X_WP);
+  Penetration out = options_.method == Method::descent  ? descend(X_WP, X_start)
+                    : options_.method == Method::planar ? planar(X_WP)
+                                                        : translational(X_WP);
+  if (!in_contact(out.projection)) return out;
+  Projection at_q = out.projection;  // keeps the multipliers of the method
+  exact_.balance(X_WP, at_q);
+  out.projection.kkt_residual = at_q.kkt_residual;
+  return out;
 }
 
 Penetration PenetrationDepth::descend(const Pose& X_WP, const Pose& X_start) noexcept {

@@ -67,14 +67,15 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
                                   row.penetration.projection.X_WQ);
     row.F_S = spatial_wrench(X_WP, row.F_T);
     if (row.penetration.projection.status == ProjectionStatus::infeasible)
-      row.penetration.projection.energy = std::numeric_limits<double>::quiet_NaN();
+      row.penetration.projection.energy = row.penetration.projection.kkt_residual =
+          std::numeric_limits<double>::quiet_NaN();
     rows.push_back(row);
   }
   return rows;
 }
 
 void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool proxy) {
-  out << kHeader << (proxy ? ",status,iterations" : "") << '\n';
+  out << kHeader << (proxy ? ",status,iterations" : "") << ",kkt_residual\n";
   for (const SolvedPose& r : rows) {
     const Quaterniond& q = r.X_WM.rotation;
     CsvRow row(out);
@@ -83,6 +84,7 @@ void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool prox
     row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
     row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
     if (proxy) row << status_name(r.penetration.projection.status) << r.penetration.projection.iterations;
+    row << r.penetration.projection.kkt_residual;
   }
 }
 

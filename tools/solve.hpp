@@ -39,7 +39,8 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
                               const SolveSettings& settings);
 
 /// Writes the rows as CSV with a header. Numbers have the shortest form that converts back to the same value.
-/// proxy: adds columns for status and iterations. Not RT-safe: writes to a stream.
+/// proxy: adds columns for status and iterations before the last one, the KKT residual. Not RT-safe: writes
+/// to a stream.
 void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool proxy = false);
 
 }  // namespace wrenchd

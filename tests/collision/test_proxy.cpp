@@ -15,6 +15,7 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/unbalanced_pull.hpp"
 
 namespace wrenchd {
 namespace {
@@ -128,6 +129,34 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
     }
   }
   CHECK(nearest >= 36);
+}
+
+// The residual is computed independently, and contacts count only where both bodies are.
+TEST_CASE("a tick that says converged has a pull that its contacts balance", "[proxy]") {
+  for (const BodyKind kind : {BodyKind::solid, BodyKind::surface})
+    for (const std::size_t i : {5, 7, 11, 13, 15, 19}) {
+      ManipulationCase handling = manipulation_cases()[i];
+      handling.obstacle_kind = kind;
+      INFO(handling.name << (kind == BodyKind::surface ? ", as a surface" : ""));
+      Followed f(handling);
+      HandTrajectory hand(handling, 5);
+      int converged = 0, spent = 0;
+      for (int tick = 0; tick < case_count(900); ++tick) {
+        const Pose X_WP = hand.next();
+        const Projection q = f.follow(X_WP);
+        INFO("tick " << tick << ", reported residual " << q.kkt_residual);
+        if (q.status == ProjectionStatus::converged) {
+          ++converged;
+          REQUIRE(q.kkt_residual <= kOptimalResidual);
+          REQUIRE(unbalanced_pull(f.scene, X_WP, q) <= 1e-6);
+        }
+        if (q.status == ProjectionStatus::budget_spent) {
+          ++spent;
+          REQUIRE(q.kkt_residual > kOptimalResidual);  // an optimum is not called unfinished
+        }
+      }
+      CHECK(spent <= 10 + converged / 10);
+    }
 }
 
 /// A sheet of 0.2 m square in z = 0, in n x n cells; every second one faces down.

@@ -19,7 +19,7 @@ using namespace test;
 constexpr const char* kColumns =
     "contacts,energy,px,py,pz,qx,qy,qz,qw,eps_vx,eps_vy,eps_vz,eps_wx,eps_wy,eps_wz,"
     "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
-    "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
+    "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns,kkt_residual";
 
 /// Example 4.1: a cube of side 50 about its own frame, over the plane y = 0.
 const std::string kCube = as_off(triangulated(box({-25, -25, -25}, {25, 25, 25})));
@@ -122,6 +122,7 @@ TEST_CASE("wrenchctl solve reproduces example 4.1") {
   check_vector(row, "eps_v", kEpsV, 1e-8);
   check_vector(row, "eps_w", kEpsW, 1e-8);
   CHECK(row.at("solve_ns") > 0);
+  CHECK(row.at("kkt_residual") < 1e-9);
 
   // k_P = 1: the body wrench is eps. W_S = Ad_(p^-1)' W_T: in world axes, about the origin of the world.
   check_vector(row, "body_f", kEpsV, 1e-8);
@@ -819,7 +820,7 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
     std::istringstream lines(result.out);
     std::string line;
     std::getline(lines, line);
-    CHECK(line.substr(line.rfind("solve_ns")) == "solve_ns,status,iterations");
+    CHECK(line.substr(line.rfind("solve_ns")) == "solve_ns,status,iterations,kkt_residual");
     std::vector<std::string> rows;
     while (std::getline(lines, line)) rows.push_back(line);
     REQUIRE(rows.size() == 63);
@@ -832,6 +833,8 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
     CHECK(column(0, 28) == "free");
     CHECK(column(2, 28) == "converged");
     CHECK(column(62, 28) == "free");
+    CHECK(std::stod(column(0, 30)) == 0.0);
+    CHECK(std::stod(column(2, 30)) <= 1e-6);
     const double top = tool == std::string("cube") ? 0.0255 : 0.0055;
     CHECK(std::stod(column(2, 4)) == Approx(top).margin(1e-8));
     CHECK(std::stod(column(2, 4)) > top);

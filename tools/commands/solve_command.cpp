@@ -106,10 +106,12 @@ class SolveCommand final : public Subcommand {
         "if the pose is admissible), energy T [kg m^2] of Eq. (8), the projected pose of the mesh frame, "
         "eps\n"
         "of Eq. (15) in the body frame at the centre of mass, the wrench in that frame and about the world\n"
-        "origin, and the duration of the solve [ns]. Each pose is solved without history; method exact then\n"
-        "searches for the global optimum. With --proxy, each row ends with status (free, converged,\n"
-        "iteration_limit, infeasible) and iterations. The first pose is at scene time 0. Without --proxy,\n"
-        "all poses are at scene time 0, with moving obstacles at their start.");
+        "origin, and the duration of the solve [ns]. The last column is the KKT residual: the part of the\n"
+        "pull towards the commanded pose that no contact balances. Each pose is solved without history;\n"
+        "method exact then searches for the global optimum. With --proxy, each row also has status (free,\n"
+        "converged, iteration_limit, infeasible) and iterations. Method exact is converged only if the\n"
+        "residual is at most 1e-6. The first pose is at scene time 0. Without --proxy, all poses are at\n"
+        "scene time 0, with moving obstacles at their start.");
     solve->callback([this] { exit_code_ = run(); });
   }
 
