@@ -25,7 +25,7 @@ namespace wrenchd {
 /// of more than 180 degrees can meet the edge first, so an edge is convex seen from at most one sector. The
 /// rule also holds at the border (one face), at edges of three or more faces, and where the faces are wound
 /// against each other. A vertex of a surface is convex if a plane through it leaves all its neighbours on one
-/// side, whichever side that is: core/METHOD.md, section 14.3.
+/// side, whichever side that is: core/METHOD.md, section 14.10.
 ///
 /// Construction is not RT-safe: it may take seconds. Accessors are RT-safe.
 class MeshSurface {
