@@ -174,12 +174,14 @@ bool MeshContacts::closes(double start_m, double end_m) const noexcept {
 }
 
 /// Returns true if a plane keeps a triangle on one side at both ends of the path, and so on the whole path,
-/// by at least min_gap_m at the start.
+/// by at least min_gap_m at the start. Both sides have the same tolerance: on either side of a surface a tool
+/// that is held at the clearance touches.
 bool MeshContacts::plane_separates(const Heights& start_m, const Heights& end_m,
                                    double min_gap_m) const noexcept {
-  if (std::min({end_m[0], end_m[1], end_m[2]}) > (1.0 + sweep_tolerance::kClosing) * clearance_m_ + min_gap_m)
+  const double apart_m = (1.0 + sweep_tolerance::kClosing) * clearance_m_ + min_gap_m;
+  if (std::min({end_m[0], end_m[1], end_m[2]}) > apart_m)
     return std::min({start_m[0], start_m[1], start_m[2]}) >= min_gap_m;
-  if (std::max({end_m[0], end_m[1], end_m[2]}) < -clearance_m_ - min_gap_m)
+  if (std::max({end_m[0], end_m[1], end_m[2]}) < -apart_m)
     return std::max({start_m[0], start_m[1], start_m[2]}) <= -min_gap_m;
   return false;
 }

@@ -147,7 +147,8 @@ CgalContacts::MovedTriangle CgalContacts::moved_triangle(const ObstacleView& vie
 }
 
 /// Returns true if a plane keeps a triangle on one side at both ends of the path, and so on the whole path,
-/// by at least min_gap_m at the start.
+/// by at least min_gap_m at the start. Both sides have the same tolerance: on either side of a surface a tool
+/// that is held at the clearance touches.
 bool CgalContacts::plane_separates(const MeshSurface::Plane& plane_start, const MeshSurface::Plane& plane_end,
                                    const Triangle& start, const Triangle& end, double min_gap_m) const {
   const auto all = [](const Triangle& triangle, const MeshSurface::Plane& plane, double height, int side) {
@@ -158,9 +159,9 @@ bool CgalContacts::plane_separates(const MeshSurface::Plane& plane_start, const 
     return std::none_of(triangle.begin(), triangle.end(),
                         [&](const Vector3d& p) { return side * exact::side_of_plane(plane, height, p) > 0; });
   };
-  if (all(end, plane_end, (1.0 + kClosing) * clearance_m_ + min_gap_m, 1))
-    return none(start, plane_start, min_gap_m, -1);
-  if (all(end, plane_end, -clearance_m_ - min_gap_m, -1)) return none(start, plane_start, -min_gap_m, 1);
+  const double apart_m = (1.0 + kClosing) * clearance_m_ + min_gap_m;
+  if (all(end, plane_end, apart_m, 1)) return none(start, plane_start, min_gap_m, -1);
+  if (all(end, plane_end, -apart_m, -1)) return none(start, plane_start, -min_gap_m, 1);
   return false;
 }
 

@@ -14,6 +14,7 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/random_values.hpp"
+#include "tests/support/sweep_comparison.hpp"
 
 // Obstacles of kind "surface": their interior edges must not hold the tool, and nothing may pass through
 // them.
@@ -98,6 +99,7 @@ Scene against(TriangleMesh tool, TriangleMesh obstacle, BodyKind kind) {
 struct Difference {
   std::vector<double> relative;  ///< difference of the energies of each tick, relative to the larger one
   long contacts = 0;
+  long spent = 0;  ///< ticks in which one of the proxies did not converge
 
   double quantile(double share) {
     std::sort(relative.begin(), relative.end());
@@ -117,6 +119,8 @@ Difference compare(const Scene& one, const Scene& other, const ManipulationCase&
     X_second = b.X_WQ;
     const double most = std::max(a.energy, b.energy);
     difference.contacts += a.energy > 0.0 ? 1 : 0;
+    const auto is_spent = [](const Projection& q) { return q.status == ProjectionStatus::budget_spent; };
+    difference.spent += is_spent(a) || is_spent(b) ? 1 : 0;
     // Energies of displacements below a micrometre are rounding.
     difference.relative.push_back(std::abs(a.energy - b.energy) /
                                   std::max(most, one.tool().solid.inertia.mass_kg * 1e-12));
@@ -215,6 +219,7 @@ TEST_CASE("the winding of a surface and ribs on its far side do not change how i
            << ": p99.9 " << d.quantile(0.999) << ", " << d.contacts << " ticks in contact");
       CHECK(d.quantile(0.5) < 1e-6);
       CHECK(d.quantile(0.999) < 0.01);
+      CHECK(d.spent <= case_count(1500) / 1000);  // a tool touches on both sides of a face
     }
   }
 }
@@ -292,6 +297,48 @@ TEST_CASE("nothing passes through a Moebius band, and its interior edges do not 
     CHECK(converged > contacts * 9 / 10);
     CHECK(differ <= ticks / 100);  // it does not stick at the seam
   }
+}
+
+TEST_CASE("wrenchd's kernels and CGAL meet the same contacts at borders, ribs and a Moebius band",
+          "[surface_contacts]") {
+  const TriangleMesh cube = make_mesh({"cube", 12}), bumpy = make_mesh({"bumpy", 500});
+  const TriangleMesh wavy_sheet = wavy(sheet(6, true));
+  struct Case {
+    const char* name;
+    TriangleMesh tool, surface;
+    Vector3d start_m;
+  };
+  const std::vector<Case> cases = {{"sheet", cube, sheet(4, true), {0.08, 0.08, 0.03}},
+                                   {"wavy sheet", bumpy, wavy_sheet, {0.05, 0, 0.055}},
+                                   {"ribs", cube, with_ribs(sheet(6, false), 6), {0.1, 0, -0.03}},
+                                   {"wavy ribs", cube, with_ribs(wavy_sheet, 6), {0.1, 0, 0.031}},
+                                   {"band", cube, moebius_band(24, 5), {0.1, 0, 0.034}}};
+  long contacts = 0, touching = 0;
+  for (const Case& c : cases) {
+    const Scene scene = against(c.tool, c.surface, BodyKind::surface);
+    const ManipulationCase handling = {c.name, {}, {}, HandMotion::slide, c.start_m};
+    SweepComparison comparison(scene);
+    Proxy proxy(scene);
+    HandTrajectory hand(handling);
+    RandomValues random(4);
+    Pose X_WQ = {Quaterniond::Identity(), c.start_m};
+    for (int tick = 0; tick < case_count(150); ++tick) {
+      const Projection q = proxy.follow(hand.next(), X_WQ);
+      comparison.compare(X_WQ, q.X_WQ);
+      X_WQ = q.X_WQ;
+      for (int k = 0; k < 2; ++k)
+        comparison.compare(X_WQ,
+                           {(X_WQ.rotation * random.rotation(random.log_uniform(1e-9, 0.05))).normalized(),
+                            X_WQ.translation_m + random.log_uniform(1e-9, 0.02) * random.unit<3>()});
+    }
+    INFO(c.name << ": " << comparison.counts().first_difference);
+    CHECK(comparison.counts().different == 0);
+    CHECK(comparison.counts().largest_difference == 0.0);
+    contacts += comparison.counts().contacts;
+    touching += comparison.counts().touching;
+  }
+  CHECK(contacts > case_count(500));
+  CHECK(touching > case_count(500));
 }
 
 /// A closed shell around the origin, which each ray from the origin meets once.
