@@ -359,3 +359,44 @@ TEST_CASE("at the iteration limit the result is admissible and no worse than tra
     CHECK(q.energy <= hurried.translate(c.X_WP, SceneContacts(c.scene), c.X_WP).energy * (1.0 + 1e-9));
   }
 }
+
+TEST_CASE("balance finds the multipliers of an optimum and the pull that no contact balances",
+          "[projection]") {
+  RandomValues random(17);
+  for (int i = 0; i < 60; ++i) {
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
+    ExactProjection exact(c.scene.tool().solid.inertia);
+    const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
+    REQUIRE(q.status == ProjectionStatus::converged);
+    Projection again = q;
+    again.active.clear();
+    for (const ActiveContact& active : q.active) again.active.add({active.contact, 0.0});
+    exact.balance(c.X_WP, again);
+    CHECK(again.kkt_residual < 1e-9);
+    REQUIRE(again.active.size() == q.active.size());
+    double load = 0.0, same_load = 0.0;
+    for (std::size_t k = 0; k < q.active.size(); ++k) {
+      CHECK(again.active[k].multiplier >= 0.0);
+      load += q.active[k].multiplier;
+      same_load += again.active[k].multiplier;
+    }
+    CHECK(same_load == Approx(load).epsilon(1e-8));  // all normals are equal, so the sum is unique
+    // Without its contacts nothing balances the pull. Contacts that do not touch do not count.
+    Projection none = q;
+    none.active.clear();
+    exact.balance(c.X_WP, none);
+    CHECK(none.kkt_residual == Approx(1.0));
+    Projection apart = again;
+    apart.X_WQ.translation_m += 1e-6 * c.scene.half_spaces()[0].normal_W;
+    exact.balance(c.X_WP, apart);
+    CHECK(apart.kkt_residual == Approx(1.0));
+    for (const ActiveContact& active : apart.active) CHECK(active.multiplier == 0.0);
+    // A sideways displacement along the plane is not balanced, the normal part is.
+    Projection beside = again;
+    const Vector3d along = c.scene.half_spaces()[0].normal_W.unitOrthogonal();
+    beside.X_WQ.translation_m += 0.1 * along;
+    exact.balance(c.X_WP, beside);
+    CHECK(beside.kkt_residual > 1e-3);
+    CHECK(beside.kkt_residual < 1.0);
+  }
+}
