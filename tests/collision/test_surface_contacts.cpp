@@ -394,5 +394,32 @@ TEST_CASE("a tool caged in a closed shell taken as a surface never leaves it", "
   }
 }
 
+TEST_CASE("a stab at 23 m/s does not pass through an open sheet from either side", "[surface_contacts]") {
+  constexpr double kReach_m = 0.12, kSpeed_m_per_s = 23.0;
+  const TriangleMesh wavy_sheet = wavy(sheet(10, true));
+  for (const char* kind : {"cube", "bumpy", "gear"})
+    for (const TriangleMesh& surface : {wavy_sheet, with_ribs(wavy_sheet, 10)})
+      for (const double side : {1.0, -1.0}) {
+        const Scene scene = against(make_mesh({kind, 300}), surface, BodyKind::surface);
+        const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), surface);
+        Proxy proxy(scene);
+        RandomValues random(6);
+        Pose X_WQ = {Quaterniond::Identity(), {0.0, 0.0, side * kReach_m}}, X_WP = X_WQ;
+        double direction = -side;
+        REQUIRE_FALSE(exact.intersect(X_WQ));
+        for (int tick = 0; tick < case_count(300); ++tick) {
+          if (std::abs(X_WP.translation_m.z()) >= kReach_m)
+            direction = X_WP.translation_m.z() > 0.0 ? -1.0 : 1.0;
+          X_WP.translation_m.z() += direction * 1e-3 * kSpeed_m_per_s * random.uniform(0.2, 1.0);
+          X_WP.translation_m.head<2>() = 0.02 * random.unit<2>();
+          X_WP.rotation = (X_WP.rotation * random.rotation(0.02)).normalized();
+          X_WQ = proxy.follow(X_WP, X_WQ).X_WQ;
+          INFO(kind << " on side " << side << ", tick " << tick);
+          REQUIRE_FALSE(exact.intersect(X_WQ));
+          REQUIRE(side * X_WQ.translation_m.z() > 0.0);
+        }
+      }
+}
+
 }  // namespace
 }  // namespace wrenchd
