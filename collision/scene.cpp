@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "collision/meshes/convex_hull.hpp"
@@ -23,14 +21,20 @@ struct LoadedObstacle {
   std::optional<ConvexBody> hull;  ///< in file units; empty if the mesh is not convex
 };
 
-LoadedObstacle make(const MeshObstacleSettings& obstacle, double surface_tolerance_m, bool all_convex,
-                    MeshLoader& loader) {
+std::shared_ptr<const LoadedMesh> load(const MeshObstacleSettings& obstacle, MeshLoader& loader) {
+  return obstacle.parts.empty() ? loader.load(obstacle.mesh, obstacle.kind, obstacle.generated)
+                                : loader.load_parts(obstacle.parts, obstacle.kind);
+}
+
+LoadedObstacle make(std::shared_ptr<const LoadedMesh> loaded, const MeshObstacleSettings& obstacle,
+                    double surface_tolerance_m, bool all_convex, MeshLoader& loader) {
   LoadedObstacle loaded_obstacle;
-  loaded_obstacle.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.generated);
+  loaded_obstacle.loaded = std::move(loaded);
   loader.check_size(*loaded_obstacle.loaded, obstacle.scale, kPlausibleObstacleSize);
   require_size_for_contacts(loaded_obstacle.loaded->mesh, obstacle.scale, obstacle.mesh);
   TriangleMesh mesh = loaded_obstacle.loaded->mesh;
-  if (all_convex && obstacle.kind == BodyKind::solid && may_be_convex(mesh)) {
+  if (all_convex && obstacle.kind == BodyKind::solid && !loaded_obstacle.loaded->parts_overlap &&
+      may_be_convex(mesh)) {
     ConvexBody hull = loader.hull(*loaded_obstacle.loaded);
     if (is_convex(mesh, hull)) loaded_obstacle.hull = std::move(hull);
   }
@@ -50,12 +54,15 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   const bool all_at_rest = std::none_of(
       settings.meshes.begin(), settings.meshes.end(),
       [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.scheduled; });
-  bool all_convex = all_at_rest && is_convex(tool.mesh, tool.hull);
-  std::map<std::tuple<std::filesystem::path, double, BodyKind>, LoadedObstacle> loaded_obstacles;
+  bool all_convex = all_at_rest && tool.kind == BodyKind::solid && settings.tool.parts.empty() &&
+                    is_convex(tool.mesh, tool.hull);
+  std::map<std::pair<const LoadedMesh*, double>, LoadedObstacle> loaded_obstacles;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
-    const auto [at, is_new] = loaded_obstacles.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
+    auto loaded = load(obstacle, loader);
+    const auto [at, is_new] = loaded_obstacles.try_emplace({loaded.get(), obstacle.scale});
     LoadedObstacle& loaded_obstacle = at->second;
-    if (is_new) loaded_obstacle = make(obstacle, settings.surface_tolerance_m, all_convex, loader);
+    if (is_new)
+      loaded_obstacle = make(std::move(loaded), obstacle, settings.surface_tolerance_m, all_convex, loader);
     meshes.emplace_back(obstacle.name, loaded_obstacle.bvh, obstacle.X_WM, obstacle.motion,
                         obstacle.scheduled);
     all_convex = all_convex && loaded_obstacle.hull;
@@ -65,8 +72,7 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
   if (!all_convex) convex.clear();
-  auto tool_mesh =
-      loader.build_bvh(tool.mesh, BodyKind::solid, settings.tool.mesh, settings.surface_tolerance_m);
+  auto tool_mesh = loader.build_bvh(tool.mesh, tool.kind, settings.tool.mesh, settings.surface_tolerance_m);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
 }
@@ -127,7 +133,7 @@ Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vec
       tool_mesh_(std::move(tool_mesh)),
       has_moving_obstacles_(any_moves(meshes_)) {
   if (has_moving_obstacles_) convex_.clear();
-  if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const MeshBvh>(tool_.mesh);
+  if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const MeshBvh>(tool_.mesh, tool_.kind);
   // A simplified mesh encloses the hull.
   if (tool_mesh_) tool_radius_m_ = std::max(tool_radius_m_, tool_mesh_->surface.radius_m());
 }

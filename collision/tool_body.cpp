@@ -24,30 +24,84 @@ void require_usable(const SolidProperties& solid, const std::filesystem::path& m
   throw MeshError(text.str());
 }
 
-// The hull is computed from the unscaled numbers of the file. After scaling and translation a vertex within a
-// flat face could lie one rounding error outside and become a hull vertex.
+namespace {
+
+/// Returns the mass properties of the tool. mesh, hull: in M [m].
+SolidProperties properties(const TriangleMesh& mesh, const ConvexBody& hull, const ToolSettings& settings) {
+  switch (settings.inertia_source) {
+    case InertiaSource::solid:
+      return solid_properties(mesh, settings.mass_kg);
+    case InertiaSource::hull:
+      return solid_properties(surface_of(hull), settings.mass_kg);
+    case InertiaSource::shell:
+      return shell_properties(mesh, settings.mass_kg, settings.shell_thickness_m);
+    case InertiaSource::given:
+      break;
+  }
+  SolidProperties given;
+  given.volume_m3 = settings.kind == BodyKind::solid ? solid_properties(mesh, 1.0).volume_m3 : volume(hull);
+  given.p_MT_m = settings.centre_of_mass_m;
+  given.inertia = {settings.mass_kg, settings.inertia_kg_m2};
+  return given;
+}
+
+}  // namespace
+
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
   ConvexBody hull = convex_hull(mesh.vertices_m);
   return tool_body(std::move(mesh), std::move(hull), scale, mass_kg);
 }
 
 ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass_kg) {
+  ToolSettings settings;
+  settings.scale = scale;
+  settings.mass_kg = mass_kg;
+  return tool_body(std::move(mesh), std::move(hull), settings);
+}
+
+// The hull is computed from the unscaled numbers of the file. After scaling and translation a vertex within a
+// flat face could lie one rounding error outside and become a hull vertex.
+ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, const ToolSettings& settings) {
   ToolBody tool;
+  tool.kind = settings.kind;
   tool.hull = std::move(hull);
-  for (Vector3d& p : mesh.vertices_m) p *= scale;
-  tool.solid = solid_properties(mesh, mass_kg);
-  for (Vector3d& p : tool.hull.vertices_T_m) p = p * scale - tool.solid.p_MT_m;
+  for (Vector3d& p : mesh.vertices_m) p *= settings.scale;
+  for (Vector3d& p : tool.hull.vertices_T_m) p *= settings.scale;
+  tool.solid = properties(mesh, tool.hull, settings);
+  for (Vector3d& p : tool.hull.vertices_T_m) p -= tool.solid.p_MT_m;
   tool.hull.compute_derived_data();
   for (Vector3d& p : mesh.vertices_m) p -= tool.solid.p_MT_m;
   tool.mesh = std::move(mesh);
   return tool;
 }
 
+std::string inertia_text(const ToolSettings& settings) {
+  switch (settings.inertia_source) {
+    case InertiaSource::solid:
+      return "its inertia is that of the uniform solid";
+    case InertiaSource::hull:
+      return "its inertia is that of its convex hull, filled uniformly";
+    case InertiaSource::shell: {
+      std::ostringstream text;
+      text.imbue(std::locale::classic());
+      text << "its inertia is that of a shell of " << 1e3 * settings.shell_thickness_m
+           << " mm along its faces";
+      return text.str();
+    }
+    case InertiaSource::given:
+      break;
+  }
+  return "its centre of mass and inertia are those of the scene";
+}
+
 ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader) {
-  const auto loaded = loader.load(settings.mesh, BodyKind::solid, settings.generated);
-  ToolBody tool = tool_body(loaded->mesh, loader.hull(*loaded), settings.scale, settings.mass_kg);
+  const auto loaded = settings.parts.empty() ? loader.load(settings.mesh, settings.kind, settings.generated)
+                                             : loader.load_parts(settings.parts, settings.kind);
+  ToolBody tool = tool_body(loaded->mesh, loader.hull(*loaded), settings);
   require_usable(tool.solid, settings.mesh, settings.scale);
   loader.check_size(*loaded, settings.scale, kPlausibleToolSize);
+  if (settings.inertia_source != InertiaSource::solid)
+    loader.add_change(loaded->file.string() + ": as the tool, " + inertia_text(settings));
   return tool;
 }
 

@@ -2,8 +2,12 @@
 #include "config/load_scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <optional>
+#include <utility>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 #include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
@@ -19,6 +23,8 @@ constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kRotation = {-10.0, 10.0};
+constexpr Range kShellThickness_m = {1e-6, 1.0};
+constexpr Range kTensor = {-1e6, 1e6};
 constexpr Range kSurfaceTolerance_m = {0.0, 1e-3};
 constexpr Range kReversal_s = {0.0, 86400.0};
 
@@ -72,9 +78,91 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
       "= \"gear\" }");
 }
 
+/// Reads a list of mesh file names: the parts of one body. mesh: receives the first one.
+void read_meshes(const TomlValue& list, const SceneSettings& scene, fs::path& mesh,
+                 std::vector<fs::path>& parts) {
+  for (const TomlValue& value : list.elements("mesh file names, as in [\"a.stl\", \"b.stl\"]")) {
+    if (value.is_table()) {
+      value.reject("a list names files; a generated mesh stands alone, as in mesh = { make = \"gear\" }");
+      continue;
+    }
+    std::optional<GeneratedMesh> none;
+    fs::path part;
+    read_mesh(value, scene, part, none);
+    parts.push_back(std::move(part));
+  }
+  if (!list) return;
+  if (parts.empty()) return list.reject("names no file; name the parts of the body, or use 'mesh'");
+  mesh = parts.front();
+}
+
+/// Reads the key `mesh` or the key `meshes` of a body.
+void read_shape(const TomlValue& mesh, const TomlValue& meshes, const SceneSettings& scene, fs::path& file,
+                std::optional<GeneratedMesh>& generated, std::vector<fs::path>& parts) {
+  if (mesh && meshes) return meshes.reject("the body has a mesh already; keep one of 'mesh' and 'meshes'");
+  if (meshes)
+    read_meshes(meshes, scene, file, parts);
+  else
+    read_mesh(mesh, scene, file, generated);
+}
+
+void read_body_kind(const TomlValue& key, BodyKind& kind) {
+  key.choice(kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
+}
+
+/// Reads the six numbers xx, yy, zz, xy, xz, yz. Rejects a tensor that no body has.
+void read_tensor(const TomlValue& key, Matrix3d& H) {
+  std::array<double, 6> n{};
+  if (!key.numbers(n, kTensor)) return;
+  Matrix3d tensor;
+  tensor << n[0], n[3], n[4], n[3], n[1], n[5], n[4], n[5], n[2];
+  const Vector3d principal = Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();  // ascending
+  constexpr double kRounding = 1e-6;
+  if (!(principal[0] > 0.0))
+    return key.reject("is no inertia: a principal moment is " + key.with_unit(principal[0]) +
+                      "; give xx, yy, zz, xy, xz, yz about the centre of mass");
+  if (principal[2] > (1.0 + kRounding) * (principal[0] + principal[1]))
+    return key.reject(
+        "is no inertia: the largest principal moment, " + key.with_unit(principal[2]) +
+        ", exceeds the sum of the other two; give xx, yy, zz, xy, xz, yz about the centre of mass");
+  H = tensor;
+}
+
+/// Reads what the inertia of the tool is that of. A surface has no volume, so its default is the convex hull.
+void read_inertia(TomlTable& table, ToolSettings& tool) {
+  const TomlValue source = table.optional("inertia");
+  const TomlValue thickness = table.optional("shell_thickness_m");
+  const TomlValue centre = table.optional("centre_of_mass_m");
+  const TomlValue tensor = table.optional("inertia_kg_m2");
+  if (tool.kind == BodyKind::surface) tool.inertia_source = InertiaSource::hull;
+  source.choice(
+      tool.inertia_source,
+      {{"solid", InertiaSource::solid}, {"hull", InertiaSource::hull}, {"shell", InertiaSource::shell}});
+  if (tool.kind == BodyKind::surface && tool.inertia_source == InertiaSource::solid)
+    source.reject(
+        "a surface has no volume; use \"hull\", \"shell\" with shell_thickness_m, or inertia_kg_m2 with "
+        "centre_of_mass_m");
+  const bool shell = tool.inertia_source == InertiaSource::shell;
+  thickness.number(tool.shell_thickness_m, kShellThickness_m);
+  if (thickness && !shell) thickness.reject("belongs to inertia = \"shell\"; add it, or leave this out");
+  if (shell && !thickness) source.reject("needs shell_thickness_m, the thickness of the shell");
+  if (static_cast<bool>(centre) != static_cast<bool>(tensor))
+    (centre ? centre : tensor)
+        .reject("centre_of_mass_m and inertia_kg_m2 belong together; give both, or use inertia = \"hull\"");
+  centre.vector(tool.centre_of_mass_m, kAny);
+  read_tensor(tensor, tool.inertia_kg_m2);
+  if (!centre || !tensor) return;
+  if (source) return source.reject("inertia_kg_m2 gives the inertia already; keep one of the two");
+  tool.inertia_source = InertiaSource::given;
+}
+
 /// The mass may be in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
-  read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.generated);
+  const TomlValue meshes = table.optional("meshes");
+  read_shape(table.mandatory_unless("meshes", "mesh"), meshes, scene, scene.tool.mesh, scene.tool.generated,
+             scene.tool.parts);
+  read_body_kind(table.optional("kind"), scene.tool.kind);
+  read_inertia(table, scene.tool);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
   const TomlValue mass = table.optional("mass", "kg");
   mass.number(scene.tool.mass_kg, kMass);
@@ -123,35 +211,36 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
         "out");
 }
 
-void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettings& scene,
-                        const std::string& name) {
+void read_mesh_obstacle(const TomlValue& mesh, const TomlValue& meshes, const MeshKeys& keys,
+                        SceneSettings& scene, const std::string& name) {
   MeshObstacleSettings obstacle;
   obstacle.name = name;
-  read_mesh(mesh, scene, obstacle.mesh, obstacle.generated);
+  read_shape(mesh, meshes, scene, obstacle.mesh, obstacle.generated, obstacle.parts);
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();
   keys.rotation.vector(rotation_vector_rad, kRotation);
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
-  keys.kind.choice(obstacle.kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
+  read_body_kind(keys.kind, obstacle.kind);
   read_motion(keys, obstacle.motion);
   scene.meshes.push_back(obstacle);
 }
 
-/// Each obstacle has one shape: half_space or mesh.
+/// Each obstacle has one shape: half_space, mesh or meshes.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
   std::string name = place;
   table.optional("name").text(name);
-  const TomlValue mesh = table.optional("mesh");
-  const TomlValue half_space = table.mandatory_unless("mesh", "half_space");
+  const TomlValue mesh = table.optional("mesh"), meshes = table.optional("meshes");
+  const TomlValue half_space =
+      meshes ? table.optional("half_space") : table.mandatory_unless("mesh", "half_space");
   const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
                          table.optional("rotation_vector_rad"), table.optional("kind"),
                          table.optional("velocity_m_per_s"),    table.optional("angular_velocity_rad_per_s"),
                          table.optional("reverse_after_s")};
-  if (mesh) {
+  if (mesh || meshes) {
     if (half_space)
       half_space.reject("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
-    return read_mesh_obstacle(mesh, keys, scene, name);
+    return read_mesh_obstacle(mesh, meshes, keys, scene, name);
   }
   if (keys.kind) keys.kind.reject("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})

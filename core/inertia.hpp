@@ -24,4 +24,10 @@ struct SolidProperties {
 /// its default. Not RT-safe: linear in the number of triangles.
 SolidProperties solid_properties(const TriangleMesh& mesh, double mass_kg);
 
+/// Area times thickness, centre of mass and inertia of a uniform shell along the faces of a mesh, with the
+/// given total mass. Half of the thickness lies on each side of a face. The mesh may be open and may
+/// intersect itself. If the area is zero, leaves the inertia at its default. Not RT-safe: linear in the
+/// number of triangles.
+SolidProperties shell_properties(const TriangleMesh& mesh, double mass_kg, double thickness_m);
+
 }  // namespace wrenchd

@@ -13,13 +13,29 @@
 
 namespace wrenchd {
 
+/// The body whose inertia the tool has.
+enum class InertiaSource : std::uint8_t {
+  solid,  ///< the uniform solid that the mesh bounds
+  hull,   ///< the uniform solid that the convex hull of the mesh bounds
+  shell,  ///< a uniform shell along the faces of the mesh
+  given,  ///< the scene states the centre of mass and the inertia tensor
+};
+
 /// The tool: the virtual body that the user moves. M: frame of the mesh file.
 struct ToolSettings {
   std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY file; a relative path is relative to the scene file
   double scale = 1.0;          ///< metres per mesh unit
-  double mass_kg = 1.0;        ///< mass of the uniform solid; it scales T and moves no minimizer
+  double mass_kg = 1.0;        ///< mass of the tool; it scales T and moves no minimizer
   std::optional<GeneratedMesh> generated =
       {};  ///< mesh that wrenchd generates; then `mesh` is its generated_mesh_name() instead of a file
+  /// Files of the parts of a tool that consists of several, the first one equal to `mesh`. Empty: one mesh.
+  std::vector<std::filesystem::path> parts = {};
+  /// A surface may be open or intersect itself. Its inertia cannot be that of the solid.
+  BodyKind kind = BodyKind::solid;
+  InertiaSource inertia_source = InertiaSource::solid;
+  double shell_thickness_m = 0.0;                 ///< for InertiaSource::shell
+  Vector3d centre_of_mass_m = Vector3d::Zero();   ///< in M, for InertiaSource::given
+  Matrix3d inertia_kg_m2 = Matrix3d::Identity();  ///< about the centre of mass, axes of M, for given
 };
 
 /// Solid half-space normal_W . x < offset_m.
@@ -42,7 +58,17 @@ struct MeshObstacleSettings {
   std::optional<ScheduledMotion> scheduled = {};
   /// mesh that wrenchd generates; then `mesh` is its generated_mesh_name() instead of a file
   std::optional<GeneratedMesh> generated = {};
+  /// Files of the parts of an obstacle that consists of several, the first one equal to `mesh`. Empty: one
+  /// mesh.
+  std::vector<std::filesystem::path> parts = {};
 };
+
+/// Returns the files of the meshes of a body; none if wrenchd generates its mesh. Not RT-safe: allocates.
+template <class Body>
+std::vector<std::filesystem::path> mesh_files(const Body& body) {
+  if (body.generated) return {};
+  return body.parts.empty() ? std::vector<std::filesystem::path>{body.mesh} : body.parts;
+}
 
 struct SceneSettings {
   std::filesystem::path file;  ///< source file, for messages

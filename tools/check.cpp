@@ -58,7 +58,10 @@ std::string about(const SceneSettings& settings, double rate_Hz, MeshLoader& mes
   const Scene scene(settings, meshes);
   const ToolBody& tool = scene.tool();
   std::ostringstream text;
-  text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
+  text << "  tool " << settings.tool.mesh.filename().string()
+       << (settings.tool.parts.size() > 1 ? " and " + std::to_string(settings.tool.parts.size() - 1) + " more"
+                                          : "")
+       << (tool.kind == BodyKind::surface ? " (surface)" : "") << ": volume " << tool.solid.volume_m3
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';

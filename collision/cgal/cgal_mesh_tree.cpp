@@ -141,12 +141,14 @@ bool CgalMeshTree::contains(const Vector3d& p_m) const {
   const Point p = to_point(p_m);
   if (!CGAL::do_overlap(p.bbox(), box)) return false;
   const double reach_m = 4.0 * (box.xmax() - box.xmin() + box.ymax() - box.ymin() + box.zmax() - box.zmin());
-  bool odd = false;
+  int count = 0;  // how often the segment leaves the body minus how often it enters
   for (const Vector3d& direction : kDirections) {
     const Point q = to_point(p_m + reach_m * direction);
     std::vector<Primitive::Id> hit;
     tree_->tree.all_intersected_primitives(Kernel::Segment_3(p, q), std::back_inserter(hit));
-    odd = hit.size() % 2 == 1;
+    count = 0;
+    for (const Primitive::Id& id : hit)
+      count += CGAL::orientation((*id)[0], (*id)[1], (*id)[2], p) == CGAL::NEGATIVE ? 1 : -1;
     const bool clear = std::none_of(hit.begin(), hit.end(), [&](const Primitive::Id& id) {
       for (int i = 0; i < 3; ++i)
         if (CGAL::orientation(p, q, (*id)[i], (*id)[i + 1]) == CGAL::COPLANAR) return true;
@@ -154,7 +156,7 @@ bool CgalMeshTree::contains(const Vector3d& p_m) const {
     });
     if (clear) break;
   }
-  return odd;
+  return count > 0;
 }
 
 }  // namespace wrenchd

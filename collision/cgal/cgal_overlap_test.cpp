@@ -28,8 +28,16 @@ bool CgalOverlapTest::overlaps(const MeshObstacle& obstacle, const Pose& X_OT) n
         {solid.corner_m(pair.b, 0), solid.corner_m(pair.b, 1), solid.corner_m(pair.b, 2)});
   };
   if (std::any_of(pairs.begin(), pairs.end(), intersect)) return true;
-  if (tool_tree_->contains(X.inverse_transform(solid.corner_m(0, 0)))) return true;
-  return solid.kind() == MeshSurface::Kind::solid && tree.contains(X * tool.corner_m(0, 0));
+  const auto any_shell = [](const MeshSurface& surface, const auto& is_inside) {
+    const std::vector<std::uint32_t> shells = shell_triangles(surface);
+    return std::any_of(shells.begin(), shells.end(),
+                       [&](std::uint32_t t) { return is_inside(surface.corner_m(t, 0)); });
+  };
+  if (tool.kind() == MeshSurface::Kind::solid &&
+      any_shell(solid, [&](const Vector3d& p_O) { return tool_tree_->contains(X.inverse_transform(p_O)); }))
+    return true;
+  return solid.kind() == MeshSurface::Kind::solid &&
+         any_shell(tool, [&](const Vector3d& p_T) { return tree.contains(X * p_T); });
 }
 
 }  // namespace wrenchd

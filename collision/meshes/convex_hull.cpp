@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
@@ -10,7 +12,41 @@
 
 namespace wrenchd {
 
+namespace {
+
+/// A flat sheet receives this thickness on each side, as a fraction of its size.
+constexpr double kSheet = 1e-6;
+/// Points this close to one plane, as a fraction of their size, count as flat.
+constexpr double kFlat = 1e-9;
+
+/// Returns the unit normal of the plane in which all points lie; nothing if they span a volume. size:
+/// receives the largest distance of a point from the first one.
+std::optional<Vector3d> plane_normal(std::span<const Vector3d> points, double& size) {
+  const auto farthest = [&](const auto& measure) {
+    return *std::max_element(points.begin(), points.end(),
+                             [&](const Vector3d& a, const Vector3d& b) { return measure(a) < measure(b); });
+  };
+  const Vector3d& a = points.front();
+  const Vector3d b = farthest([&](const Vector3d& p) { return (p - a).norm(); }) - a;
+  size = b.norm();
+  const Vector3d c = farthest([&](const Vector3d& p) { return (p - a).cross(b).norm(); }) - a;
+  const Vector3d normal = b.cross(c).normalized();
+  const Vector3d d = farthest([&](const Vector3d& p) { return std::abs((p - a).dot(normal)); }) - a;
+  if (std::abs(d.dot(normal)) > kFlat * size) return {};
+  return normal;
+}
+
+}  // namespace
+
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
+  double size = 0.0;
+  if (points_T_m.size() >= 3)
+    if (const auto normal = plane_normal(points_T_m, size)) {
+      std::vector<Vector3d> thick;
+      for (const Vector3d& p : points_T_m)
+        for (const double side : {-kSheet, kSheet}) thick.push_back(p + side * size * *normal);
+      if (!plane_normal(thick, size)) return convex_hull(thick);
+    }
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
   std::vector<Kernel::Point_3> points;
@@ -57,6 +93,23 @@ double volume(const ConvexBody& body) {
     }
   }
   return sixfold / 6.0;
+}
+
+TriangleMesh surface_of(const ConvexBody& body) {
+  TriangleMesh mesh{body.vertices_T_m, {}};
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : body.vertices_T_m) middle += p / static_cast<double>(body.vertices_T_m.size());
+  for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v) {
+    const auto ring = body.ring_of(v);
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const std::uint32_t a = ring[i], b = ring[(i + 1) % ring.size()];
+      if (v > a || v > b) continue;
+      const Vector3d& p = body.vertices_T_m[v];
+      const Vector3d normal = (body.vertices_T_m[a] - p).cross(body.vertices_T_m[b] - p);
+      mesh.triangles.push_back(normal.dot(p - middle) < 0.0 ? std::array{v, b, a} : std::array{v, a, b});
+    }
+  }
+  return mesh;
 }
 
 }  // namespace wrenchd

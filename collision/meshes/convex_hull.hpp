@@ -4,14 +4,20 @@
 #include <span>
 
 #include "core/convex_body.hpp"
+#include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
 /// Returns the convex hull of points in T with the ordered neighbours of each vertex and its faces.
-/// Precondition: the points span a volume. Not RT-safe: allocates, may take seconds.
+/// Points that lie in one plane, as those of a flat sheet, receive a thickness of 2e-6 of their size, so that
+/// the hull has a volume. Precondition: the points do not lie on one line. Not RT-safe: allocates, may take
+/// seconds.
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m);
 
 /// Returns the volume of a convex body [cube of the vertices' unit]. RT-safe.
 double volume(const ConvexBody& body);
+
+/// Returns the surface of a convex body: its triangles, outward. Not RT-safe: allocates.
+TriangleMesh surface_of(const ConvexBody& body);
 
 }  // namespace wrenchd

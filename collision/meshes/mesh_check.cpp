@@ -6,12 +6,20 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <locale>
+#include <map>
+#include <numeric>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
 
+#include <CGAL/AABB_face_graph_triangle_primitive.h>
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_2_algorithms.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
@@ -20,6 +28,7 @@
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
 #include <CGAL/Projection_traits_3.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/property_map.h>
 
 #include "collision/meshes/defect_count.hpp"
 #include "collision/meshes/half_edges.hpp"
@@ -43,7 +52,11 @@ std::string index_text(std::size_t v) {
 }
 
 /// In a mesh that intersects itself everywhere the number of pairs grows with the square of the faces.
-constexpr std::size_t kMaxIntersections = 1000;
+constexpr std::size_t kMaxIntersections = 20'000;
+
+/// Largest overlap of two faces that is tolerated, as a fraction of the mesh's diagonal. Exporters of CAD
+/// programs create such overlaps when they triangulate and round.
+constexpr double kMaxOverlap = 1e-5;
 
 std::string face_name(const PolygonSoup& soup, std::size_t f) {
   return "face " + std::to_string(soup.face_in_file(f));
@@ -216,26 +229,184 @@ std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh,
   return face_of;
 }
 
-void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::size_t>& face_of,
-                             MeshReport& report) {
-  std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
-  PMP::self_intersections(mesh, std::back_inserter(pairs),
-                          CGAL::parameters::maximum_number(kMaxIntersections));
-  report.self_intersecting = !pairs.empty();
-  if (pairs.empty()) return;
+using MeshTriangle = std::array<Vector3d, 3>;
+
+MeshTriangle triangle_of(const SurfaceMesh& mesh, SurfaceMesh::Face_index face) {
+  MeshTriangle corners;
+  std::size_t k = 0;
+  for (const auto v : mesh.vertices_around_face(mesh.halfedge(face))) {
+    const auto& p = mesh.point(v);
+    corners[k++ % 3] = {p.x(), p.y(), p.z()};
+  }
+  return corners;
+}
+
+/// Returns how far one of two intersecting triangles must move so that they touch at most: the least overlap
+/// of their projections on an axis, over all axes on which triangles can be separated.
+double overlap_of(const MeshTriangle& a, const MeshTriangle& b) {
+  double least = std::numeric_limits<double>::infinity();
+  const auto test = [&](const Vector3d& axis) {
+    const double length = axis.norm();
+    if (!(length > 0.0)) return;
+    const auto range = [&](const MeshTriangle& t) {
+      const double p = axis.dot(t[0]), q = axis.dot(t[1]), r = axis.dot(t[2]);
+      return std::pair(std::min({p, q, r}), std::max({p, q, r}));
+    };
+    const auto [a_low, a_high] = range(a);
+    const auto [b_low, b_high] = range(b);
+    least = std::min(least, std::min(a_high - b_low, b_high - a_low) / length);
+  };
+  const auto side = [](const MeshTriangle& t, std::size_t i) -> Vector3d { return t[(i + 1) % 3] - t[i]; };
+  const Vector3d normal_a = side(a, 0).cross(side(a, 1)), normal_b = side(b, 0).cross(side(b, 1));
+  test(normal_a);
+  test(normal_b);
+  for (std::size_t i = 0; i < 3; ++i) {
+    test(normal_a.cross(side(a, i)));
+    test(normal_b.cross(side(b, i)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      // The cross product of nearly parallel sides is rounding, and no axis.
+      const Vector3d axis = side(a, i).cross(side(b, k));
+      if (axis.norm() > 1e-6 * side(a, i).norm() * side(b, k).norm()) test(axis);
+    }
+  }
+  return std::max(least, 0.0);
+}
+
+/// Counts how often closed shells enclose a point: 0 outside, 1 inside of a solid, 2 where two solids
+/// overlap, -1 where a surface is folded inside out.
+class WindingNumber {
+ public:
+  explicit WindingNumber(const SurfaceMesh& mesh)
+      : mesh_(mesh), tree_(faces(mesh).begin(), faces(mesh).end(), mesh) {
+    tree_.build();
+    for (const auto v : mesh.vertices()) box_ += mesh.point(v).bbox();
+  }
+
+  /// Returns nothing if every ray that was tried passes through an edge.
+  std::optional<int> at(const Vector3d& p_m) const {
+    const Kernel::Point_3 p(p_m.x(), p_m.y(), p_m.z());
+    const double reach =
+        4.0 * (box_.xmax() - box_.xmin() + box_.ymax() - box_.ymin() + box_.zmax() - box_.zmin());
+    for (const Vector3d& direction :
+         {Vector3d(0.8626, 0.3919, 0.3199), Vector3d(-0.3577, 0.8713, 0.3361),
+          Vector3d(0.2153, -0.4441, 0.8697), Vector3d(-0.7129, -0.5101, -0.4811)}) {
+      const Vector3d far = p_m + reach * direction;
+      const Kernel::Point_3 q(far.x(), far.y(), far.z());
+      std::vector<SurfaceMesh::Face_index> hit;
+      tree_.all_intersected_primitives(Kernel::Segment_3(p, q), std::back_inserter(hit));
+      int count = 0;
+      bool clear = true;
+      for (const auto f : hit) {
+        std::array<Kernel::Point_3, 3> t;
+        std::size_t k = 0;
+        for (const auto v : mesh_.vertices_around_face(mesh_.halfedge(f))) t[k++ % 3] = mesh_.point(v);
+        for (std::size_t i = 0; i < 3; ++i)
+          clear = clear && CGAL::orientation(p, q, t[i], t[(i + 1) % 3]) != CGAL::COPLANAR;
+        const CGAL::Orientation side = CGAL::orientation(t[0], t[1], t[2], p);
+        clear = clear && side != CGAL::COPLANAR;
+        count += side == CGAL::NEGATIVE ? 1 : -1;  // the segment leaves through the face, or enters
+      }
+      if (clear) return count;
+    }
+    return {};
+  }
+
+ private:
+  using Primitive = CGAL::AABB_face_graph_triangle_primitive<SurfaceMesh>;
+  const SurfaceMesh& mesh_;
+  CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
+  CGAL::Bbox_3 box_;
+};
+
+using FacePair = std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>;
+using ShellOfFace = std::vector<std::size_t>;
+
+ShellOfFace shells_of(const SurfaceMesh& mesh) {
+  ShellOfFace shell(mesh.number_of_faces());
+  PMP::connected_components(mesh, CGAL::make_property_map(shell));
+  return shell;
+}
+
+/// Returns true if a mesh whose faces intersect bounds one solid: on both sides of each of these faces, and
+/// of one face of each shell, the winding number is 0 or 1 at this distance. So parts that overlap deeply are
+/// found even if each pair of faces only touches.
+bool bounds_one_solid(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs, const ShellOfFace& shell,
+                      double distance) {
+  std::set<SurfaceMesh::Face_index> some;
+  for (const auto& [a, b] : pairs) some.insert({a, b});
+  std::set<std::size_t> known;
+  for (const auto f : mesh.faces())
+    if (known.insert(shell[f]).second) some.insert(f);
+  const WindingNumber winding(mesh);
+  for (const auto f : some) {
+    const MeshTriangle t = triangle_of(mesh, f);
+    const Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized(),
+                   middle = (t[0] + t[1] + t[2]) / 3.0;
+    for (const Vector3d& p : {middle, Vector3d(0.7 * t[0] + 0.3 * middle),
+                              Vector3d(0.7 * t[1] + 0.3 * middle), Vector3d(0.7 * t[2] + 0.3 * middle)})
+      for (const double side : {-1.0, 1.0}) {
+        const std::optional<int> count = winding.at(p + side * distance * normal);
+        if (count && (*count < 0 || *count > 1)) return false;
+      }
+  }
+  return true;
+}
+
+/// Names two faces that intersect and the number of all pairs.
+std::string intersection_text(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs,
+                              const std::vector<std::size_t>& face_of, const std::string& verb) {
   const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
   const std::size_t a = face_of[pairs[0].first], b = face_of[pairs[0].second];
+  return (a == b ? "two halves of face " + std::to_string(a)
+                 : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
+         " near " + format_point({corner.x(), corner.y(), corner.z()}) + ' ' + verb +
+         (pairs.size() < kMaxIntersections ? total_suffix(pairs.size())
+                                           : " (" + std::to_string(kMaxIntersections) + " or more in all)");
+}
+
+void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::size_t>& face_of,
+                             MeshReport& report) {
+  std::vector<FacePair> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs),
+                          CGAL::parameters::maximum_number(kMaxIntersections));
+  if (pairs.empty()) return;
+  const ShellOfFace shell = shells_of(mesh);
+  if (pairs.size() < kMaxIntersections) {
+    double overlap = 0.0;
+    for (const auto& [a, b] : pairs)
+      overlap = std::max(overlap, overlap_of(triangle_of(mesh, a), triangle_of(mesh, b)));
+    CGAL::Bbox_3 box;
+    for (const auto v : mesh.vertices()) box += mesh.point(v).bbox();
+    const double diagonal =
+        Vector3d(box.xmax() - box.xmin(), box.ymax() - box.ymin(), box.zmax() - box.zmin()).norm();
+    if (overlap <= kMaxOverlap * diagonal &&
+        bounds_one_solid(mesh, pairs, shell, 1.5 * kMaxOverlap * diagonal)) {
+      std::ostringstream depth;
+      depth.imbue(std::locale::classic());
+      depth.precision(2);
+      depth << overlap / diagonal;
+      report.tolerated = intersection_text(mesh, pairs, face_of, "overlap") + " by at most " + depth.str() +
+                         " of the diagonal of the mesh; contacts use all of them";
+      return;
+    }
+  }
+  report.self_intersecting = true;
+  const bool between_shells = std::any_of(pairs.begin(), pairs.end(), [&](const FacePair& pair) {
+    return shell[pair.first] != shell[pair.second];
+  });
   report.defects.push_back(
-      (a == b ? "two halves of face " + std::to_string(a)
-              : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
-      " near " + format_point({corner.x(), corner.y(), corner.z()}) + " intersect each other" +
-      (pairs.size() < kMaxIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
-      "; unite the parts in the modeller");
+      intersection_text(mesh, pairs, face_of, "intersect each other") +
+      (between_shells
+           ? "; unite the parts in the modeller, or give the file as a list of parts, meshes = "
+             "[\"FILE\"], which are then one body"
+           : "; the surface passes through itself: use it with kind = \"surface\", or remesh it in the "
+             "modeller"));
 }
 
 void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
   report.volume = CGAL::to_double(PMP::volume(mesh));
-  report.outward = !report.self_intersecting && report.volume > 0.0 && PMP::does_bound_a_volume(mesh);
+  report.outward = !report.self_intersecting && report.volume > 0.0 &&
+                   (!report.tolerated.empty() || PMP::does_bound_a_volume(mesh));
   if (report.outward || report.self_intersecting) return;
   report.defects.push_back(
       report.volume < 0.0 ? "all faces point inwards (the volume is negative); flip the faces in the modeller"
@@ -336,6 +507,43 @@ MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
   check_volume(mesh, report);
   if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
   return report;
+}
+
+std::vector<TriangleMesh> solid_shells(const PolygonSoup& soup) {
+  if (!find_invalid_values(soup).empty()) return {};
+  std::vector<std::size_t> into(soup.vertices.size());
+  std::iota(into.begin(), into.end(), std::size_t{0});
+  const auto root = [&](std::size_t v) {
+    while (into[v] != v) v = into[v] = into[into[v]];
+    return v;
+  };
+  for (const auto& face : soup.faces)
+    for (const std::size_t v : face) {
+      const std::size_t a = root(face[0]), b = root(v);
+      into[std::max(a, b)] = std::min(a, b);
+    }
+  std::map<std::size_t, PolygonSoup>
+      shells;  // by the smallest vertex, so that their order is that of the file
+  std::vector<std::size_t> number(soup.vertices.size(), soup.vertices.size());
+  for (const auto& face : soup.faces) {
+    if (face.empty()) return {};
+    PolygonSoup& shell = shells[root(face[0])];
+    auto& copy = shell.faces.emplace_back();
+    for (const std::size_t v : face) {
+      if (number[v] == soup.vertices.size()) {
+        number[v] = shell.vertices.size();
+        shell.vertices.push_back(soup.vertices[v]);
+      }
+      copy.push_back(number[v]);
+    }
+  }
+  std::vector<TriangleMesh> out;
+  for (const auto& [first, shell] : shells) {
+    TriangleMesh mesh;
+    if (!check_solid(shell, &mesh).solid()) return {};
+    out.push_back(std::move(mesh));
+  }
+  return out;
 }
 
 }  // namespace wrenchd

@@ -12,6 +12,7 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/meshes/mesh_repair.hpp"
 #include "collision/meshes/mesh_source.hpp"
+#include "collision/meshes/mesh_union.hpp"
 #include "collision/meshes/packer.hpp"
 
 namespace wrenchd {
@@ -42,7 +43,7 @@ std::string_view body_kind_name(BodyKind kind) {
 
 template <class Use>
 void visit_parts(LoadedMesh& loaded, const Use& use) {
-  use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.repairs);
+  use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.repairs), use(loaded.parts_overlap);
 }
 template <class Use>
 void visit_parts(ConvexBody& hull, const Use& use) {
@@ -64,9 +65,9 @@ std::string rejection_text(const std::filesystem::path& file, const PolygonSoup&
   for (const std::string& change : report.repairs) text += "\n  (after a repair: " + change + ")";
   if (kind == BodyKind::solid && check_surface(soup).defects.empty())
     text +=
-        "\n  an obstacle may be used as it is with kind = \"surface\": it then has two sides and no inside; "
-        "a "
-        "tool has to be a solid";
+        "\n  it may be used as it is with kind = \"surface\": it then has two sides and no inside; the "
+        "inertia of "
+        "such a tool is that of its convex hull, or as [tool] inertia states";
   return text;
 }
 
@@ -114,14 +115,24 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
   auto& loaded = loaded_[{error || made ? file : same, kind}];
   if (!loaded) loaded = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
+  return with_changes(loaded, kind);
+}
+
+/// Adds the changes of a mesh to those of the loader.
+std::shared_ptr<const LoadedMesh> MeshLoader::with_changes(const std::shared_ptr<const LoadedMesh>& loaded,
+                                                           BodyKind kind) {
   const std::string begin = loaded->file.string() + ": ";
-  for (const std::string& change : loaded->repairs) add_once(changes_, begin + change);
+  for (const std::string& change : loaded->repairs) add_change(begin + change);
   if (kind == BodyKind::surface)
-    add_once(changes_, begin +
-                           "used as a surface: it has two sides and no inside, so that nothing pushes out a "
-                           "tool that starts "
-                           "beyond it");
+    add_change(
+        begin +
+        "used as a surface: it has two sides and no inside, so that nothing pushes out a body that starts "
+        "beyond it");
   return loaded;
+}
+
+void MeshLoader::add_change(const std::string& change) {
+  add_once(changes_, change);
 }
 
 LoadedMesh MeshLoader::repair_and_check(PolygonSoup soup, const std::filesystem::path& file,
@@ -132,6 +143,78 @@ LoadedMesh MeshLoader::repair_and_check(PolygonSoup soup, const std::filesystem:
                                                     : repair_and_check_surface(soup, &made.mesh);
   if (!report.defects.empty()) throw MeshError(rejection_text(file, soup, kind, report));
   made.repairs = report.repairs;
+  if (!report.tolerated.empty()) made.repairs.push_back(report.tolerated);
+  return made;
+}
+
+std::shared_ptr<const LoadedMesh> MeshLoader::load_parts(const std::vector<std::filesystem::path>& files,
+                                                         BodyKind kind) {
+  std::string names;
+  for (const std::filesystem::path& file : files) {
+    std::error_code error;
+    const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
+    names += "part " + (error ? file : same).string() + '\n';  // no file name begins so
+  }
+  auto& loaded = loaded_[{names, kind}];
+  if (loaded) return with_changes(loaded, kind);
+  std::vector<MeshSource> sources;
+  std::vector<std::string> extensions;
+  std::size_t bytes = 0;
+  for (const std::filesystem::path& file : files) {
+    sources.push_back(read_mesh_source(file));
+    extensions.push_back(file.extension().string());
+    bytes += sources.back().bytes.size();
+  }
+  std::vector<std::string_view> made_from = {"parts", body_kind_name(kind)};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    made_from.push_back(extensions[i]);
+    made_from.push_back(sources[i].bytes);
+  }
+  const bool large = bytes >= kLargeMeshBytes;
+  if (progress_ && large)
+    progress_(files.front().filename().string() + " and " + std::to_string(files.size() - 1) +
+              " more: uniting the parts");
+  LoadedMesh made = cached<LoadedMesh>(made_from, large, [&] { return join_parts(sources, kind); });
+  made.file = files.front();
+  loaded = std::make_shared<const LoadedMesh>(std::move(made));
+  return with_changes(loaded, kind);
+}
+
+LoadedMesh MeshLoader::join_parts(std::vector<MeshSource> sources, BodyKind kind) const {
+  std::vector<TriangleMesh> parts;
+  LoadedMesh made;
+  for (MeshSource& source : sources) {
+    const std::filesystem::path file = source.file;
+    PolygonSoup soup = parse_mesh(std::move(source));
+    report_progress(file, soup.faces.size(), "checking");
+    TriangleMesh whole;
+    const MeshReport report = kind == BodyKind::solid ? repair_and_check_solid(soup, &whole)
+                                                      : repair_and_check_surface(soup, &whole);
+    const std::string begin = file.filename().string() + ": ";
+    for (const std::string& change : report.repairs) made.repairs.push_back(begin + change);
+    if (report.defects.empty()) {
+      if (!report.tolerated.empty()) made.repairs.push_back(begin + report.tolerated);
+      parts.push_back(std::move(whole));
+      continue;
+    }
+    std::vector<TriangleMesh> shells =
+        kind == BodyKind::solid ? solid_shells(soup) : std::vector<TriangleMesh>{};
+    if (shells.empty()) throw MeshError(rejection_text(file, soup, kind, report));
+    made.repairs.push_back(begin + "its " + std::to_string(shells.size()) + " shells are parts of one body");
+    for (TriangleMesh& shell : shells) parts.push_back(std::move(shell));
+  }
+  if (kind == BodyKind::surface) {
+    made.mesh = together(parts);
+    return made;
+  }
+  UnitedMesh all = unite(parts);
+  made.mesh = std::move(all.mesh);
+  made.parts_overlap = !all.united;
+  made.repairs.push_back(std::to_string(parts.size()) + " parts are one body" +
+                         (all.united
+                              ? ": their union"
+                              : "; their surfaces could not be united, so the volume in which they overlap "
+                                "counts twice in the inertia"));
   return made;
 }
 

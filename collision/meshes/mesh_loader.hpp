@@ -14,18 +14,24 @@
 #include "collision/meshes/make_mesh.hpp"
 #include "collision/meshes/mesh_bvh.hpp"
 #include "collision/meshes/mesh_cache.hpp"
-#include "collision/meshes/mesh_check.hpp"
 #include "collision/meshes/mesh_size.hpp"
 #include "core/convex_body.hpp"
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
+struct MeshReport;
+struct MeshSource;
+struct PolygonSoup;
+
 /// A mesh that was read from a file, repaired and checked, or a mesh that was generated and checked.
 struct LoadedMesh {
   std::filesystem::path file;
-  TriangleMesh mesh;                 ///< in the units of the file
-  std::vector<std::string> repairs;  ///< one sentence for each kind of repair (mesh_repair.hpp)
+  TriangleMesh mesh;  ///< in the units of the file
+  /// one sentence for each kind of repair (mesh_repair.hpp), and for overlaps that are tolerated
+  std::vector<std::string> repairs;
+  /// True if parts of a solid overlap, so that the volume in which they do counts twice.
+  bool parts_overlap = false;
 };
 
 /// Loads meshes and prepares them for contact queries. It reads each file once, for any number of bodies.
@@ -51,6 +57,11 @@ class MeshLoader {
   std::shared_ptr<const LoadedMesh> load(const std::filesystem::path& file, BodyKind kind,
                                          const std::optional<GeneratedMesh>& made = {});
 
+  /// Returns the meshes of several files as one body. A solid is the union of all shells of all files
+  /// (mesh_union.hpp). A surface consists of all faces. Throws MeshError. Precondition: files is not empty.
+  std::shared_ptr<const LoadedMesh> load_parts(const std::vector<std::filesystem::path>& files,
+                                               BodyKind kind);
+
   /// Returns the convex hull in file units.
   ConvexBody hull(const LoadedMesh& loaded);
 
@@ -58,6 +69,9 @@ class MeshLoader {
   /// simplified within surface_tolerance_m [m] (mesh_simplifier.hpp); 0: not at all.
   std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind,
                                            const std::filesystem::path& file, double surface_tolerance_m);
+
+  /// Adds a text to changes() once.
+  void add_change(const std::string& change);
 
   /// Adds a warning if the size of a mesh is implausible.
   void check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely);
@@ -74,6 +88,9 @@ class MeshLoader {
   LoadedMesh read(const std::filesystem::path& file, BodyKind kind);
   LoadedMesh make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind);
   LoadedMesh repair_and_check(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const;
+  LoadedMesh join_parts(std::vector<MeshSource> sources, BodyKind kind) const;
+  std::shared_ptr<const LoadedMesh> with_changes(const std::shared_ptr<const LoadedMesh>& loaded,
+                                                 BodyKind kind);
   void report_progress(const std::filesystem::path& file, std::size_t triangles,
                        const std::string& what) const;
   template <class T, class Make>

@@ -16,6 +16,7 @@
 #include "collision/meshes/defect_count.hpp"
 #include "collision/meshes/half_edges.hpp"
 #include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/point_numbers.hpp"
 
 namespace wrenchd {
 namespace {
@@ -26,8 +27,9 @@ constexpr double kMaxThinHeight = 1e-7;
 /// Maximum width of a crack that rounding to single precision or to seven digits creates, in units of the
 /// largest coordinate.
 constexpr double kMaxCrackWidth = 1e-6;
-/// Each round removes at least one layer of faces without area.
-constexpr int kMaxRounds = 20;
+/// Each round removes or shortens faces without area, so that rounds end by themselves. This limit only
+/// bounds the time for a mesh that consists of little else.
+constexpr int kMaxRounds = 500;
 /// Maximum number of shell comparisons. If more are needed, the shells stay as they are.
 constexpr std::size_t kMaxShellPairs = 10'000'000;
 
@@ -63,8 +65,8 @@ class Merged {
  public:
   explicit Merged(std::size_t count) : into_(count) { std::iota(into_.begin(), into_.end(), std::size_t{0}); }
 
-  std::size_t of(std::size_t v) const noexcept {
-    while (into_[v] != v) v = into_[v];
+  std::size_t of(std::size_t v) noexcept {
+    while (into_[v] != v) v = into_[v] = into_[into_[v]];  // halves the path, so that chains stay short
     return v;
   }
   /// Returns false if the points were merged before.
@@ -105,6 +107,7 @@ class Repair {
     close_cracks();
     orient_faces();
     drop_unused_points();
+    split_joined_points();
     return changes();
   }
 
@@ -126,7 +129,7 @@ class Repair {
     retain_marked(soup_.faces, marked);
     retain_marked(soup_.face_numbers, marked);
   }
-  void use(const Merged& merged) {
+  void use(Merged& merged) {
     half_edges_.clear();
     for (Face& face : soup_.faces)
       for (std::size_t& v : face) v = merged.of(v);
@@ -137,6 +140,13 @@ class Repair {
   void merge_equal_points();
   void clean();
   void drop_repeated_corners();
+  struct ThinFace {
+    std::size_t face, longest;  ///< number of the face, and the corner at which its longest side starts
+  };
+  void split_thin_polygons(double tolerance);
+  void add_face(Face face, std::size_t like);
+  bool merge_needles(const std::vector<ThinFace>& list, double tolerance);
+  bool fold_caps(const std::vector<ThinFace>& list, double tolerance);
   bool fold_thin_faces();
   void drop_duplicate_faces();
   void close_cracks();
@@ -145,13 +155,16 @@ class Repair {
                             bool& closed) const;
   bool contains_point(const Shell& shell, const std::vector<bool>& flipped, const Vector3d& p) const;
   void orient_shells_outwards(std::vector<Shell>& shells, std::vector<bool>& flipped) const;
+  std::vector<std::pair<const HalfEdge*, const HalfEdge*>> pair_around_edge(
+      std::span<const HalfEdge> half_edges) const;
+  void split_joined_points();
 
   double thin(const Face& face, std::size_t& longest) const;
 
   PolygonSoup& soup_;
   Eigen::AlignedBox3d box_;
   std::vector<HalfEdge> half_edges_;  ///< cached half-edges; empty: outdated
-  DefectCount unused_, merged_, repeated_, too_few_, duplicate_, thin_, joined_, flipped_;
+  DefectCount unused_, merged_, repeated_, too_few_, duplicate_, thin_, joined_, flipped_, split_;
 };
 
 std::vector<std::string> Repair::changes() const {
@@ -164,6 +177,7 @@ std::vector<std::string> Repair::changes() const {
   thin_.report(out, "removed", "face", " without area");
   joined_.report(out, "merged", "point", " along cracks no wider than single precision");
   flipped_.report(out, "flipped", "face", "");
+  split_.report(out, "split", "point", " at which parts of the surface are only joined");
   return out;
 }
 
@@ -199,22 +213,16 @@ void Repair::drop_unused_points() {
 }
 
 void Repair::merge_equal_points() {
-  std::vector<std::size_t> order(soup_.vertices.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
   const auto& p = soup_.vertices;
-  const auto before = [&](std::size_t a, std::size_t b) {
-    return std::lexicographical_compare(p[a].data(), p[a].data() + 3, p[b].data(), p[b].data() + 3);
-  };
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return before(a, b) || (!before(b, a) && a < b); });
-  Merged merged(order.size());
-  std::vector<bool> duplicate(order.size(), false);
-  for (std::size_t i = 1; i < order.size(); ++i)
-    duplicate[order[i]] = p[order[i]] == p[order[i - 1]] && merged.merge(order[i - 1], order[i]);
-  for (std::size_t v = 0; v < duplicate.size(); ++v)
-    if (duplicate[v])
-      merged_.add(
-          [&] { return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + format_point(p[v]); });
+  Merged merged(p.size());
+  PointNumbers numbers(p, p.size());
+  for (std::size_t v = 0; v < p.size(); ++v) {
+    const std::size_t first = numbers.find_or_add(p[v], v);
+    if (first == v) continue;
+    merged.merge(first, v);
+    merged_.add(
+        [&] { return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + format_point(p[v]); });
+  }
   if (!merged_.any()) return;
   use(merged);
   drop_unused_points();
@@ -268,71 +276,154 @@ double Repair::thin(const Face& face, std::size_t& longest) const {
   return longest_squared > 0.0 ? twice_area / std::sqrt(longest_squared) : 0.0;
 }
 
-/// A needle is removed by merging the ends of its shortest side. A cap has a corner on its longest side. It
-/// is removed by inserting that corner into the face across that side. The surface stays equal and no edge
-/// becomes open.
-bool Repair::fold_thin_faces() {
-  const double tolerance = kMaxThinHeight * box_.sizes().maxCoeff();
-  struct Thin {
-    std::size_t face, longest;
-  };
-  std::vector<Thin> list;
-  std::vector<bool> marked(soup_.faces.size(), true);
-  for (std::size_t f = 0, longest = 0; f < soup_.faces.size(); ++f)
-    if (thin(soup_.faces[f], longest) <= tolerance) {
-      list.push_back({f, longest});
-      marked[f] = false;
-    }
-  if (list.empty()) return false;
+/// Replaces a polygon whose corners lie on one line by triangles, which fold_thin_faces() removes.
+void Repair::split_thin_polygons(double tolerance) {
+  const auto& p = soup_.vertices;
+  const std::size_t count = soup_.faces.size();
+  for (std::size_t f = 0; f < count; ++f) {
+    if (soup_.faces[f].size() < 4) continue;
+    const Face face = soup_.faces[f];
+    const auto from_first = [&](std::size_t v) -> Vector3d { return p[v] - p[face[0]]; };
+    const std::size_t farthest =
+        *std::max_element(face.begin(), face.end(), [&](std::size_t a, std::size_t b) {
+          return from_first(a).squaredNorm() < from_first(b).squaredNorm();
+        });
+    const double length = from_first(farthest).norm();
+    if (std::any_of(face.begin(), face.end(), [&](std::size_t v) {
+          return from_first(v).cross(from_first(farthest)).norm() > tolerance * length;
+        }))
+      continue;
+    soup_.faces[f].resize(3);
+    for (std::size_t i = 2; i + 1 < face.size(); ++i) add_face({face[0], face[i], face[i + 1]}, f);
+  }
+}
 
+/// Adds a face that has the same number in the file as face `like`.
+void Repair::add_face(Face face, std::size_t like) {
+  half_edges_.clear();
+  store_numbers(soup_.face_numbers, soup_.faces.size());
+  soup_.faces.push_back(std::move(face));
+  soup_.face_numbers.push_back(soup_.face_numbers[like]);
+}
+
+/// Merges the ends of the shortest side of each needle. Returns false if there is no needle.
+bool Repair::merge_needles(const std::vector<ThinFace>& list, double tolerance) {
+  const auto& p = soup_.vertices;
+  Merged merged(soup_.vertices.size());
+  std::vector<bool> marked(soup_.faces.size(), true);
+  bool changed = false;
+  for (const auto& [f, longest] : list) {
+    const Face& face = soup_.faces[f];
+    const std::size_t a = face[longest], b = face[next(face, longest)], apex = face[(longest + 2) % 3];
+    const std::size_t nearer = (p[a] - p[apex]).norm() < (p[b] - p[apex]).norm() ? a : b;
+    if ((p[nearer] - p[apex]).norm() > tolerance) continue;
+    const std::size_t face_number = f;  // clang 14 cannot capture structured bindings
+    thin_.add([&] { return face_place(face_number); });
+    changed = true;
+    marked[f] = false;
+    merged.merge(nearer, apex);
+  }
+  if (!changed) return false;
+  keep_faces(marked);
+  use(merged);
+  return true;
+}
+
+/// A cap has a corner on its longest side. It is removed by inserting that corner into the face across that
+/// side. If that face has the corner already, it falls into two. If that face is a cap as well, the two are
+/// replaced by the two triangles across the other diagonal, which are shorter. So the surface stays equal and
+/// no edge becomes open. A face that changed is not used again in the same round. Returns false if nothing
+/// changed.
+bool Repair::fold_caps(const std::vector<ThinFace>& list, double tolerance) {
   const std::vector<HalfEdge>& all_half_edges = half_edges();
   const auto faces_along = [&](std::size_t a, std::size_t b) {
     const auto [low, high] = std::minmax(a, b);
     return std::equal_range(all_half_edges.begin(), all_half_edges.end(), HalfEdge{{low, high}, 0, false},
                             [](const HalfEdge& x, const HalfEdge& y) { return x.edge < y.edge; });
   };
-  Merged merged(soup_.vertices.size());
+  const auto side_length = [&](const Face& face, std::size_t i) {
+    return (soup_.vertices[face[next(face, i)]] - soup_.vertices[face[i]]).norm();
+  };
+  std::vector<bool> kept(soup_.faces.size(), true), used(soup_.faces.size(), false);
+  std::vector<std::pair<Face, std::size_t>> added;
   bool changed = false;
   for (const auto& [f, longest] : list) {
-    const Face& face = soup_.faces[f];
+    if (used[f]) continue;
+    const Face face = soup_.faces[f];
     const std::size_t a = face[longest], b = face[next(face, longest)], apex = face[(longest + 2) % 3];
-    const auto& p = soup_.vertices;
-    const std::size_t nearer = (p[a] - p[apex]).norm() < (p[b] - p[apex]).norm() ? a : b;
     const std::size_t face_number = f;  // clang 14 cannot capture structured bindings
-    const auto count_thin = [&] { thin_.add([&] { return face_place(face_number); }); };
-    if ((p[nearer] - p[apex]).norm() <= tolerance) {
-      count_thin();
-      changed = true;
-      merged.merge(nearer, apex);
-      continue;
-    }
+    const auto remove = [&](std::size_t number) {
+      kept[number] = false;
+      used[number] = changed = true;
+      thin_.add([&] { return face_place(number); });
+    };
     const auto [first, last] = faces_along(a, b);
-    if (last - first != 2) {  // no unique neighbour
-      count_thin();
-      changed = true;
+    const bool forward =
+        std::find_if(first, last, [&](const HalfEdge& h) { return h.face == face_number; })->forward;
+    const std::ptrdiff_t count = last - first;
+    const auto across = std::find_if(first, last, [&](const HalfEdge& h) {
+      return h.face != face_number && (h.forward != forward || count == 2);
+    });
+    if (across == last) {  // a border: no neighbour needs the corner
+      remove(f);
       continue;
     }
-    const std::size_t other = first->face == f ? (first + 1)->face : first->face;
+    const std::size_t other = across->face;
+    if (used[other]) continue;
     Face& neighbour = soup_.faces[other];
-    const bool can_take =
-        marked[other] && std::find(neighbour.begin(), neighbour.end(), apex) == neighbour.end();
-    std::size_t at = neighbour.size();
-    for (std::size_t i = 0; i < neighbour.size() && can_take; ++i) {
-      const std::size_t from = neighbour[i], to = neighbour[next(neighbour, i)];
-      if ((from == a && to == b) || (from == b && to == a)) at = i;
+    std::size_t other_longest = 0;
+    const bool other_is_thin = thin(neighbour, other_longest) <= tolerance;
+    if (other_is_thin && side_length(neighbour, other_longest) > side_length(face, longest)) continue;
+    std::size_t at = 0;  // the neighbour's side along the edge starts here
+    while (at < neighbour.size() && !((neighbour[at] == a && neighbour[next(neighbour, at)] == b) ||
+                                      (neighbour[at] == b && neighbour[next(neighbour, at)] == a)))
+      ++at;
+    if (at == neighbour.size()) continue;
+    Face loop = neighbour;
+    std::rotate(loop.begin(), loop.begin() + static_cast<std::ptrdiff_t>(next(neighbour, at)), loop.end());
+    loop.push_back(apex);
+    const auto twice = std::find(loop.begin(), loop.end() - 1, apex);
+    std::vector<Face> parts;
+    if (twice != loop.end() - 1) {
+      parts = {Face(loop.begin(), twice + 1), Face(twice + 1, loop.end())};
+    } else if (other_is_thin) {
+      parts = {{loop[0], loop[1], apex}, {loop[1], loop[2], apex}};
+    } else {
+      parts = {loop};
     }
-    if (at == neighbour.size()) {
-      marked[f] = true;  // a later round may remove it
+    std::erase_if(parts, [](const Face& part) { return part.size() < 3; });
+    if (twice == loop.end() - 1 && other_is_thin) {  // as many faces as before, and shorter
+      soup_.faces[f] = parts[0];
+      neighbour = parts[1];
+      used[f] = used[other] = changed = true;
       continue;
     }
-    count_thin();
-    changed = true;
-    neighbour.insert(neighbour.begin() + static_cast<std::ptrdiff_t>(at) + 1, apex);
+    remove(f);
+    used[other] = true;
+    if (parts.empty()) {
+      remove(other);
+      continue;
+    }
+    neighbour = parts[0];
+    if (parts.size() > 1) added.emplace_back(parts[1], other);
   }
   if (!changed) return false;
-  keep_faces(marked);
-  use(merged);
+  half_edges_.clear();
+  for (auto& [face, like] : added) add_face(std::move(face), like);
+  kept.resize(soup_.faces.size(), true);
+  keep_faces(kept);
   return true;
+}
+
+/// Returns false if there is no face without area, or if none of them can be removed.
+bool Repair::fold_thin_faces() {
+  const double tolerance = kMaxThinHeight * box_.sizes().maxCoeff();
+  split_thin_polygons(tolerance);
+  std::vector<ThinFace> list;
+  for (std::size_t f = 0, longest = 0; f < soup_.faces.size(); ++f)
+    if (thin(soup_.faces[f], longest) <= tolerance) list.push_back({f, longest});
+  if (list.empty()) return false;
+  return merge_needles(list, tolerance) || fold_caps(list, tolerance);
 }
 
 /// Returns the corners in an order that is independent of start and orientation.
@@ -531,6 +622,97 @@ void Repair::orient_faces() {
     flipped_.add([&] { return face_place(f); });
     std::reverse(soup_.faces[f].begin(), soup_.faces[f].end());
   }
+}
+
+/// Pairs the faces around an edge so that each pair bounds a wedge of the solid. Returns no pair if the faces
+/// do not enclose wedges: if one direction is more frequent than the other.
+std::vector<std::pair<const HalfEdge*, const HalfEdge*>> Repair::pair_around_edge(
+    std::span<const HalfEdge> half_edges) const {
+  const auto& p = soup_.vertices;
+  const Vector3d along = p[half_edges[0].edge.second] - p[half_edges[0].edge.first];
+  const Vector3d x = along.unitOrthogonal(), y = along.normalized().cross(x);
+  struct Wing {
+    std::int64_t angle;  ///< rounded, so that equal angles are equal
+    const HalfEdge* half_edge;
+  };
+  std::vector<Wing> wings;
+  for (const HalfEdge& half_edge : half_edges) {
+    const Face& face = soup_.faces[half_edge.face];
+    Vector3d normal = Vector3d::Zero();
+    for (std::size_t i = 1; i + 1 < face.size(); ++i)
+      normal += (p[face[i]] - p[face[0]]).cross(p[face[i + 1]] - p[face[0]]);
+    const Vector3d into = normal.cross(half_edge.forward ? along : Vector3d(-along));  // into the face
+    wings.push_back({std::llround(1e9 * std::atan2(into.dot(y), into.dot(x))), &half_edge});
+  }
+  // A forward face has the solid before it, in the sense of increasing angle, and a backward face behind it.
+  // So each pair is a backward face and the forward face that closes its wedge. Of two faces at one angle the
+  // forward one comes first.
+  std::sort(wings.begin(), wings.end(), [](const Wing& a, const Wing& b) {
+    return std::pair(a.angle, !a.half_edge->forward) < std::pair(b.angle, !b.half_edge->forward);
+  });
+  std::vector<std::pair<const HalfEdge*, const HalfEdge*>> pairs;
+  std::vector<const HalfEdge*> open;
+  for (std::size_t i = 0; i < 2 * wings.size(); ++i) {  // twice around, because the first wedge may be open
+    const HalfEdge* const half_edge = wings[i % wings.size()].half_edge;
+    const bool second_round = i >= wings.size();
+    if (!half_edge->forward) {
+      if (!second_round) open.push_back(half_edge);
+    } else if (!open.empty() && std::none_of(pairs.begin(), pairs.end(),
+                                             [&](const auto& pair) { return pair.second == half_edge; })) {
+      pairs.emplace_back(open.back(), half_edge);
+      open.pop_back();
+    }
+  }
+  if (2 * pairs.size() != wings.size()) pairs.clear();
+  return pairs;
+}
+
+/// Parts of a surface that are joined only in a point or in an edge receive points of their own. There the
+/// parts then touch each other. Corners of faces that are connected across edges keep a common point.
+void Repair::split_joined_points() {
+  std::vector<std::size_t> begin(soup_.faces.size() + 1, 0);
+  for (std::size_t f = 0; f < soup_.faces.size(); ++f) begin[f + 1] = begin[f] + soup_.faces[f].size();
+  Merged fan(begin.back());  // corners of faces
+  const auto corner = [&](const HalfEdge& half_edge, bool at_low) {
+    const Face& face = soup_.faces[half_edge.face];
+    const std::size_t from = half_edge.forward ? half_edge.edge.first : half_edge.edge.second;
+    const std::size_t to = half_edge.forward ? half_edge.edge.second : half_edge.edge.first;
+    std::size_t i = 0;
+    while (face[i] != from || face[next(face, i)] != to) ++i;
+    return begin[half_edge.face] + (at_low == half_edge.forward ? i : next(face, i));
+  };
+  const auto connect = [&](const HalfEdge& a, const HalfEdge& b) {
+    for (const bool at_low : {true, false}) fan.merge(corner(a, at_low), corner(b, at_low));
+  };
+  for_each_edge(half_edges(), [&](std::span<const HalfEdge> at_edge) {
+    if (at_edge.size() == 2) return connect(at_edge[0], at_edge[1]);
+    if (at_edge.size() < 2) return;
+    const auto pairs = pair_around_edge(at_edge);
+    for (const auto& [a, b] : pairs) connect(*a, *b);
+    if (pairs.empty())
+      for (const HalfEdge& half_edge : at_edge) connect(at_edge[0], half_edge);
+  });
+  std::vector<std::size_t> fan_of_point(soup_.vertices.size(), kNone);
+  std::unordered_map<std::size_t, std::size_t> own_point;  // of further fans
+  for (std::size_t f = 0; f < soup_.faces.size(); ++f)
+    for (std::size_t i = 0; i < soup_.faces[f].size(); ++i) {
+      std::size_t& v = soup_.faces[f][i];
+      const std::size_t this_fan = fan.of(begin[f] + i);
+      if (fan_of_point[v] == kNone) fan_of_point[v] = this_fan;
+      if (fan_of_point[v] == this_fan) continue;
+      const auto [own, is_new] = own_point.try_emplace(this_fan, soup_.vertices.size());
+      if (is_new) {
+        split_.add([&] {
+          return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " +
+                 format_point(soup_.vertices[v]);
+        });
+        store_numbers(soup_.vertex_numbers, soup_.vertices.size());
+        soup_.vertices.push_back(Vector3d(soup_.vertices[v]));
+        soup_.vertex_numbers.push_back(soup_.vertex_numbers[v]);
+      }
+      v = own->second;
+    }
+  if (split_.any()) half_edges_.clear();
 }
 
 }  // namespace

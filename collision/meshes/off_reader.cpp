@@ -84,6 +84,13 @@ void read_vertices(const MeshSource& source, LineReader& lines, const OffVariant
   }
 }
 
+/// Appends the words of the following lines until a face has `width` words, because a face may occupy several
+/// lines.
+void join_lines(LineReader& lines, std::size_t width, Words& words) {
+  Words more;
+  while (words.size() < width && lines.next_words(more)) words.insert(words.end(), more.begin(), more.end());
+}
+
 void read_faces(const MeshSource& source, LineReader& lines, const OffVariant& variant,
                 const OffCounts& counts, PolygonSoup& soup) {
   Words words;
@@ -91,28 +98,30 @@ void read_faces(const MeshSource& source, LineReader& lines, const OffVariant& v
   for (std::size_t f = 0; f < counts.faces; ++f) {
     const std::string what = "face " + std::to_string(f);
     if (!lines.next_words(words)) reject_short(source, what, counts.faces);
+    const std::size_t line = lines.number();
     const auto corners = parse_integer(words[0]);
+    // A polygon has at most all vertices as corners.
+    if (corners && *corners >= 0 && static_cast<std::size_t>(*corners) <= counts.vertices)
+      join_lines(lines, static_cast<std::size_t>(*corners) + 1, words);
     if (!corners || *corners < 0 || static_cast<std::size_t>(*corners) >= words.size())
-      source.reject(lines.number(), what + ": " + quote_word(words[0]) + " corners declared, " +
-                                        std::to_string(words.size() - 1) +
-                                        " numbers follow; export the mesh again");
+      source.reject(line, what + ": " + quote_word(words[0]) + " corners declared, " +
+                              std::to_string(words.size() - 1) + " numbers follow; export the mesh again");
     const std::size_t width = static_cast<std::size_t>(*corners) + 1;
     std::vector<std::size_t>& face = soup.faces.emplace_back();
     face.reserve(width - 1);
     for (std::size_t i = 1; i < width; ++i) {
       const auto v = parse_integer(words[i]);
       if (!v || *v < 0 || static_cast<std::size_t>(*v) >= counts.vertices)
-        source.reject(lines.number(), what + ": there is no vertex " + quote_word(words[i]) + "; there are " +
-                                          std::to_string(counts.vertices) +
-                                          ", numbered from 0: export the mesh again");
+        source.reject(line, what + ": there is no vertex " + quote_word(words[i]) + "; there are " +
+                                std::to_string(counts.vertices) + ", numbered from 0: export the mesh again");
       face.push_back(static_cast<std::size_t>(*v));
     }
     if (f == 0) colour_width = words.size() - width;
     if (!variant.allows(words.size() - width) || (variant.colours && words.size() - width != colour_width))
-      source.reject(lines.number(),
+      source.reject(line,
                     what + ": a colour has 3 or 4 numbers, at every face or at none; save without colours");
     if (!variant.colours) continue;
-    for (std::size_t i = width; i < words.size(); ++i) require_number(source, lines.number(), words[i], what);
+    for (std::size_t i = width; i < words.size(); ++i) require_number(source, line, words[i], what);
   }
 }
 

@@ -6,7 +6,8 @@
 
 namespace wrenchd {
 
-/// Reads an ASCII OFF file (keyword OFF, COFF, NOFF or CNOFF). Ignores normals and colours. Throws MeshError
+/// Reads an ASCII OFF file (keyword OFF, COFF, NOFF or CNOFF). A face may occupy several
+/// lines. Ignores normals and colours. Throws MeshError
 /// that names the line and the remedy. Not RT-safe: allocates in proportion to the file.
 PolygonSoup read_off(const MeshSource& source);
 

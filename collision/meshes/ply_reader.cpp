@@ -197,8 +197,8 @@ const PlyProperty* corner_list(const PlyElement& element) {
 
 void require_faces(const MeshSource& source, const PlyElement& element) {
   if (corner_list(element) == nullptr)
-    source.reject(
-        0, "element 'face' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
+    source.reject(0, "element '" + element.name +
+                         "' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
 }
 
 bool is_vertex(const PlyElement& element) {
@@ -209,13 +209,18 @@ bool is_face(const PlyElement& element) {
   return element.name == "face" || element.name == "faces";
 }
 
+/// Triangle strips, as range scanners and vcglib write them.
+bool is_strip(const PlyElement& element) {
+  return element.name == "tristrips" || element.name == "tristrip";
+}
+
 void check_elements(const MeshSource& source, const PlyHeader& header) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty())
       source.reject(0, "element " + quote_word(element.name) + " has no properties; export the mesh again");
     require_equal_colour_types(source, element);
     if (is_vertex(element)) require_vertices(source, element);
-    if (is_face(element)) require_faces(source, element);
+    if (is_face(element) || is_strip(element)) require_faces(source, element);
     if (element.name == "halfedge")
       source.reject(0, "contains half-edges; save the mesh with vertices and faces only");
   }
@@ -296,8 +301,27 @@ UsedProperties used_properties(const PlyElement& element) {
     used.y = position_of(element, find(element, "y"));
     used.z = position_of(element, find(element, "z"));
   }
-  if (is_face(element)) used.corners = position_of(element, corner_list(element));
+  if (is_face(element) || is_strip(element)) used.corners = position_of(element, corner_list(element));
   return used;
+}
+
+/// Adds the triangles of strips. Each vertex forms a triangle with the two vertices before it; every second
+/// triangle traverses them in the opposite order. The number -1 begins a new strip. A triangle that uses a
+/// vertex twice only joins two strips and is left out.
+void add_strips(const std::vector<double>& values, PolygonSoup& soup) {
+  std::size_t length = 0;  // vertices of the present strip so far
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] == -1.0) {
+      length = 0;
+      continue;
+    }
+    if (++length < 3) continue;
+    const auto corner = [&](std::size_t k) {
+      return static_cast<std::size_t>(static_cast<std::int64_t>(values[i - 2 + k]));
+    };
+    const std::size_t a = corner(length % 2 == 1 ? 0 : 1), b = corner(length % 2 == 1 ? 1 : 0), c = corner(2);
+    if (a != b && b != c && c != a) soup.faces.push_back({a, b, c});
+  }
 }
 
 /// Reads one item of an element into the soup.
@@ -313,6 +337,10 @@ void read_item(const MeshSource& source, const PlyElement& element, const UsedPr
     if (k == used.y) p.y() = values[0];
     if (k == used.z) p.z() = values[0];
     if (k != used.corners) continue;
+    if (is_strip(element)) {
+      add_strips(values, soup);
+      continue;
+    }
     std::vector<std::size_t>& face = soup.faces.emplace_back();
     face.reserve(values.size());
     // A negative index wraps around, as in every other format; the mesh check reports it.

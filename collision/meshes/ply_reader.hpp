@@ -6,9 +6,9 @@
 
 namespace wrenchd {
 
-/// Reads the vertices and faces of an ASCII or binary PLY file and ignores all other elements. Throws
-/// MeshError that names the line or the element, and the remedy. Not RT-safe: allocates in proportion to the
-/// file.
+/// Reads the vertices, faces and triangle strips of an ASCII or binary PLY file and ignores all other
+/// elements. Throws MeshError that names the line or the element, and the remedy. Not RT-safe: allocates in
+/// proportion to the file.
 PolygonSoup read_ply(const MeshSource& source);
 
 }  // namespace wrenchd

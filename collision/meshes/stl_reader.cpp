@@ -5,11 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "collision/meshes/point_numbers.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {
@@ -21,11 +21,20 @@ constexpr std::size_t kTriangleBytes = 50;  ///< normal and three corners as 12 
 /// Collects triangles and gives equal vertices one index.
 class TriangleCollector {
  public:
+  /// triangles: expected number of triangles. A closed mesh has half as many vertices.
+  explicit TriangleCollector(std::size_t triangles = 0) : numbers_(soup_.vertices, triangles / 2) {
+    soup_.faces.reserve(triangles);
+    soup_.vertices.reserve(triangles / 2);
+  }
+  TriangleCollector(const TriangleCollector&) = delete;  // numbers_ refers to soup_
+  TriangleCollector& operator=(const TriangleCollector&) = delete;
+
   /// Returns the index of a vertex.
   std::size_t index_of(const std::array<double, 3>& p) {
-    const auto [at, is_new] = indices_.try_emplace(p, soup_.vertices.size());
-    if (is_new) soup_.vertices.emplace_back(p[0], p[1], p[2]);
-    return at->second;
+    const Vector3d point(p[0], p[1], p[2]);
+    const std::size_t number = numbers_.find_or_add(point, soup_.vertices.size());
+    if (number == soup_.vertices.size()) soup_.vertices.push_back(point);
+    return number;
   }
   void add(const std::array<std::size_t, 3>& triangle) {
     soup_.faces.emplace_back(triangle.begin(), triangle.end());
@@ -34,7 +43,7 @@ class TriangleCollector {
 
  private:
   PolygonSoup soup_;
-  std::map<std::array<double, 3>, std::size_t> indices_;
+  PointNumbers numbers_;
 };
 
 /// Reads a value from any address.
@@ -46,7 +55,7 @@ T value_at(const std::string& bytes, std::size_t offset) {
 }
 
 PolygonSoup read_binary(const MeshSource& source, std::size_t triangles) {
-  TriangleCollector collector;
+  TriangleCollector collector(triangles);
   for (std::size_t f = 0; f < triangles; ++f) {
     std::array<std::size_t, 3> triangle{};
     for (std::size_t corner = 0; corner < 3; ++corner) {

@@ -82,8 +82,11 @@ std::string files_fingerprint(const SceneSettings& scene) {
     text += '\n' + mesh.string() + ' ' + std::to_string(std::filesystem::file_size(mesh, error)) + ' ' +
             std::to_string(std::filesystem::last_write_time(mesh, error).time_since_epoch().count());
   };
-  add(scene.tool.mesh);
-  for (const MeshObstacleSettings& obstacle : scene.meshes) add(obstacle.mesh);
+  const auto add_all = [&add](const std::vector<std::filesystem::path>& meshes) {
+    for (const std::filesystem::path& mesh : meshes) add(mesh);
+  };
+  add_all(mesh_files(scene.tool));
+  for (const MeshObstacleSettings& obstacle : scene.meshes) add_all(mesh_files(obstacle));
   return text;
 }
 

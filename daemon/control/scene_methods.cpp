@@ -76,6 +76,7 @@ class GeometryCache {
 
 Json scene_json(const Reconfigurator& reconfigurator) {
   const SceneSettings scene = reconfigurator.scene();
+  const auto kind = [](BodyKind one) { return one == BodyKind::solid ? "solid" : "surface"; };
   Json obstacles = Json::array();
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
     obstacles.push_back(
@@ -84,13 +85,17 @@ Json scene_json(const Reconfigurator& reconfigurator) {
   for (const MeshObstacleSettings& obstacle : scene.meshes)
     obstacles.push_back({{"name", obstacle.name},
                          {"mesh", obstacle.mesh.string()},
+                         {"kind", kind(obstacle.kind)},
                          {"scale", obstacle.scale},
                          {"position_m", json_of(obstacle.X_WM.translation_m)},
                          {"rotation_vector_rad", json_of(rotation_vector(obstacle.X_WM.rotation))},
                          {"moves", obstacle.motion.moves() || obstacle.scheduled.has_value()}});
   return {{"file", scene.file.string()},
           {"tool",
-           {{"mesh", scene.tool.mesh.string()}, {"scale", scene.tool.scale}, {"mass", scene.tool.mass_kg}}},
+           {{"mesh", scene.tool.mesh.string()},
+            {"kind", kind(scene.tool.kind)},
+            {"scale", scene.tool.scale},
+            {"mass", scene.tool.mass_kg}}},
           {"obstacles", obstacles},
           {"rendering_id", reconfigurator.current_rendering().id}};
 }

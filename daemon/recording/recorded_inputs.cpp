@@ -139,9 +139,18 @@ TomlNode* table_in(TomlNode& root, const std::string& key) {
   return &made;
 }
 
-/// Replaces the mesh path of a body by the path of the unpacked file. Leaves a generated mesh unchanged.
+/// Returns the role of a part of a body: that of the body for the first part.
+std::string part_role(const std::string& body, std::size_t part) {
+  return part == 0 ? body : body + "_part_" + std::to_string(part);
+}
+
+/// Replaces the mesh paths of a body by the paths of the unpacked files. Leaves a generated mesh unchanged.
 void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& role,
               const fs::path& directory) {
+  if (TomlEntry* const parts = find(body, "meshes"))
+    if (auto* list = std::get_if<TomlNode::Array>(&parts->node.value))
+      for (std::size_t i = 0; i < list->size(); ++i)
+        (*list)[i].value = mesh_at(header, part_role(role, i), directory).string();
   TomlEntry* const mesh = find(body, "mesh");
   if (mesh != nullptr && std::holds_alternative<std::string>(mesh->node.value))
     mesh->node.value = mesh_at(header, role, directory).string();
@@ -154,7 +163,7 @@ SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory)
   if (TomlEntry* const obstacles = find(tree, "obstacle"))
     if (auto* list = std::get_if<TomlNode::Array>(&obstacles->node.value))
       for (TomlNode& obstacle : *list)
-        if (find(obstacle, "mesh") != nullptr)
+        if (find(obstacle, "mesh") != nullptr || find(obstacle, "meshes") != nullptr)
           put_mesh(obstacle, header, "obstacle_" + std::to_string(number++), directory);
   return load_scene(tree, header.scene_file);
 }
@@ -213,9 +222,12 @@ void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
     }
     header.files.push_back(std::move(mesh));
   };
-  if (!scene.tool.generated) add("tool", scene.tool.mesh);
+  const auto add_all = [&](const std::string& role, const std::vector<fs::path>& files) {
+    for (std::size_t i = 0; i < files.size(); ++i) add(part_role(role, i), files[i]);
+  };
+  add_all("tool", mesh_files(scene.tool));
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)
-    if (!scene.meshes[i].generated) add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
+    add_all("obstacle_" + std::to_string(i), mesh_files(scene.meshes[i]));
 }
 
 void set_start_time(const Clock& clock, RecordingHeader& header) {

@@ -194,7 +194,7 @@ TEST_CASE("an unusable tool is rejected with its file and the remedy") {
   CHECK(message.find(
             "\n  (after a repair: removed 1 face with fewer than three different corners: face 5 near ") !=
         std::string::npos);
-  CHECK(message.find("a tool has to be a solid") != std::string::npos);
+  CHECK(message.find("kind = \"surface\"") != std::string::npos);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 
+#include "collision/meshes/convex_hull.hpp"
 #include "collision/meshes/make_mesh.hpp"
 #include "collision/meshes/mesh_check.hpp"
 #include "collision/meshes/mesh_file.hpp"
@@ -52,6 +53,27 @@ std::string self_contact_text(TriangleMesh mesh) {
   const auto bvh = std::make_shared<const MeshBvh>(tool.mesh);
   const Scene scene(std::move(tool), {}, {}, {MeshObstacle("copy", bvh, Pose{})}, bvh);
   return text(estimate_query_cost(scene, kEstimate_s)) + ", on a copy of itself";
+}
+
+/// Prints what a mesh that is no solid gives as a surface, if it can be one.
+void print_surface(PolygonSoup soup, const std::filesystem::path& file, double scale) {
+  TriangleMesh mesh;
+  if (!check_surface(soup, &mesh).defects.empty()) return;
+  const std::size_t triangles = mesh.triangles.size();
+  ToolSettings settings;
+  settings.scale = scale;
+  settings.kind = BodyKind::surface;
+  settings.inertia_source = InertiaSource::hull;
+  ConvexBody hull = convex_hull(mesh.vertices_m);
+  const ToolBody tool = tool_body(std::move(mesh), std::move(hull), settings);
+  require_usable(tool.solid, file, scale);
+  const Matrix3d& H = tool.solid.inertia.H_kg_m2;
+  std::printf("%-18s with kind = \"surface\": %zu triangles; as a tool, %s:\n", "usable", triangles,
+              inertia_text(settings).c_str());
+  std::printf("%-18s %.9g m^3\n", "volume of the hull", tool.solid.volume_m3);
+  print_row("centre of mass", tool.solid.p_MT_m, "m");
+  print_row("inertia xx yy zz", H.diagonal(), "m^2 (per kg, about the centre of mass)");
+  print_row("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
 }
 
 void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double scale) {
@@ -128,10 +150,12 @@ class MeshCommand final : public Subcommand {
     TriangleMesh mesh;
     const MeshReport report = repair_and_check_solid(soup, &mesh);
     for (const std::string& repair : report.repairs) std::printf("%-18s %s\n", "repaired", repair.c_str());
+    if (!report.tolerated.empty()) std::printf("%-18s %s\n", "tolerated", report.tolerated.c_str());
     std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
                 report.consistent ? "yes" : "no");
     if (!report.solid()) {
       print_note(rejection_text(file_, soup, BodyKind::solid, report));
+      print_surface(std::move(soup), file_, scale_);
       return kExitDefects;
     }
     print_solid(std::move(mesh), file_, scale_);

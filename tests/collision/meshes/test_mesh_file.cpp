@@ -228,6 +228,54 @@ TEST_CASE("a wrong extension is rejected") {
   });
 }
 
+TEST_CASE("the faces of an OFF file may occupy several lines") {
+  const TemporaryDirectory dir;
+  const std::string off = as_off(kBox);
+  check_is_the_box(dir.write("faces.off", replaced(replaced(off, "4 0 4 6 2", "4\n0 4\n6 2"), "4 1 3 7 5",
+                                                   "4 1 3 7\n# a comment\n\n5 0.1 0.2 0.3")));
+  const fs::path bad = dir.write("index.off", replaced(off, "4 0 4 6 2", "4 0\n4 6 9"));
+  CHECK(rejection_text(bad).find(bad.string() + ":11: face 0: there is no vertex '9'") == 0);
+}
+
+/// The cube from (0, 0, 0) to (1, 1, 1) as one strip of 14 vertices.
+std::string strip_cube(const std::string& format, const std::string& lists) {
+  return "ply\nformat " + format +
+         " 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n"
+         "property list " +
+         lists + " vertex_indices\nend_header\n";
+}
+const std::vector<std::int32_t> kStrip = {0, 1, 4, 5, 7, 1, 3, 0, 2, 4, 6, 7, 2, 3};
+
+TEST_CASE("PLY triangle strips are read, as text and binary") {
+  const TemporaryDirectory dir;
+  std::string text = strip_cube("ascii", "int int"), binary = strip_cube("binary_little_endian", "int int");
+  for (unsigned v = 0; v < 8; ++v) {
+    const float p[3] = {(v & 1U) ? 1.0F : 0.0F, (v & 2U) ? 1.0F : 0.0F, (v & 4U) ? 1.0F : 0.0F};
+    for (const float x : p) append_bytes(binary, x);
+    text += point_text({p[0], p[1], p[2]}) + "\n";
+  }
+  // Two strips: the second one repeats the last two vertices of the first.
+  std::vector<std::int32_t> two(kStrip.begin(), kStrip.begin() + 4);
+  two.push_back(-1);
+  two.insert(two.end(), kStrip.begin() + 2, kStrip.end());
+  for (const std::vector<std::int32_t>& strip : {kStrip, two}) {
+    std::string as_text = text + std::to_string(strip.size()), as_binary = binary;
+    append_bytes(as_binary, static_cast<std::int32_t>(strip.size()));
+    for (const std::int32_t v : strip) {
+      as_text += " " + std::to_string(v);
+      append_bytes(as_binary, v);
+    }
+    for (const std::string& bytes : {as_text + "\n", as_binary}) {
+      const PolygonSoup soup = read_file(dir.write("strip.ply", bytes));
+      CHECK(soup.faces.size() == 12);
+      const MeshReport report = check_solid(soup);
+      INFO((report.defects.empty() ? "" : report.defects[0]));
+      CHECK(report.solid());
+      CHECK(report.volume == Approx(1.0));
+    }
+  }
+}
+
 TEST_CASE("invalid OFF files are rejected with the line") {
   const std::string off = as_off(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(off, from, to); };

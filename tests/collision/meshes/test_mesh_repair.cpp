@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+
 #include <catch2/catch.hpp>
 
 #include "collision/meshes/make_mesh.hpp"
@@ -193,6 +195,78 @@ TEST_CASE("a solid that is inside out is flipped, with its cavities", "[mesh_rep
                  kVolume + 1);
   check_repaired(concatenated(concatenated(kBox, cavity), inside_out(beside)),
                  {"flipped 6 faces, first face 12 near (10, 1, 0)"}, kVolume);
+}
+
+TEST_CASE("faces without area that lie on each other are removed until none is left", "[mesh_repair]") {
+  // A side of the box is divided at several points; the strip between the two divisions has no area. Its
+  // triangles are neighbours of each other only.
+  PolygonSoup soup = triangulated(kBox);
+  for (const int count : {2, 3, 8}) {
+    PolygonSoup some = soup;
+    std::vector<std::size_t> on_edge = {0};
+    for (int i = 1; i < count; ++i) {
+      on_edge.push_back(some.vertices.size());
+      some.vertices.emplace_back(2.0 * i / count, 0, 0);
+    }
+    on_edge.push_back(1);
+    std::size_t flat = 0;
+    for (auto& face : std::vector(some.faces)) {
+      const auto at = std::find(face.begin(), face.end(), std::size_t{0});
+      if (at == face.end() || face[static_cast<std::size_t>(at - face.begin() + 1) % 3] != 1) continue;
+      // The face with the side from 0 to 1 is divided; the other one keeps the whole side.
+      const std::size_t apex = face[static_cast<std::size_t>(at - face.begin() + 2) % 3];
+      std::erase(some.faces, face);
+      for (std::size_t i = 0; i + 1 < on_edge.size(); ++i)
+        some.faces.push_back({on_edge[i], on_edge[i + 1], apex});
+      // A fan from the end of the side fills the gap.
+      for (std::size_t i = 0; i + 2 < on_edge.size(); ++i, ++flat)
+        some.faces.push_back({on_edge[i], 1, on_edge[i + 1]});
+      break;
+    }
+    REQUIRE(flat == static_cast<std::size_t>(count - 1));
+    const std::vector<std::string> changes = repair(some);
+    REQUIRE(changes.size() == 1);
+    CHECK(changes[0].find("removed " + std::to_string(flat) + " face") == 0);
+    const MeshReport report = check_solid(some);
+    INFO((report.defects.empty() ? "" : report.defects[0]));
+    CHECK(report.solid());
+    CHECK(report.volume == Approx(kVolume));
+  }
+}
+
+TEST_CASE("a leaf of two faces without area disappears", "[mesh_repair]") {
+  PolygonSoup soup = triangulated(kBox);
+  soup.vertices.emplace_back(0.7, 0, 0);  // on the side from 0 to 1
+  soup.vertices.emplace_back(1.4, 0, 0);
+  soup.faces.push_back({8, 1, 9});
+  soup.faces.push_back({9, 1, 8});
+  soup.faces.push_back({0, 9, 8});
+  soup.faces.push_back({8, 9, 0});
+  repair(soup);
+  const MeshReport report = check_solid(soup);
+  INFO((report.defects.empty() ? "" : report.defects[0]));
+  CHECK(report.solid());
+  CHECK(report.volume == Approx(kVolume));
+}
+
+TEST_CASE("parts joined in a point or an edge are split", "[mesh_repair]") {
+  PolygonSoup point = concatenated(kBox, box({2, 3, 5}, {4, 4, 6}));
+  for (auto& face : point.faces)
+    for (std::size_t& v : face) v = v == 8 ? 7 : v;
+  PolygonSoup edge = concatenated(kBox, box({2, -3, 0}, {4, 0, 5}));
+  for (auto& face : edge.faces)
+    for (std::size_t& v : face) v = v == 8 + 2 ? 1 : v == 8 + 6 ? 5 : v;
+  for (PolygonSoup* soup : {&point, &edge}) {
+    CHECK_FALSE(check_solid(*soup).solid());
+    const std::vector<std::string> changes = repair(*soup);
+    REQUIRE_FALSE(changes.empty());
+    CHECK(changes.back().find("split ") == 0);
+    const MeshReport report = check_solid(*soup);
+    INFO((report.defects.empty() ? "" : report.defects[0]));
+    CHECK(report.solid());
+    CHECK(report.volume == Approx(soup == &point ? 32 : 60));
+    CHECK(solid_shells(*soup).size() == 2);  // each box is one part
+  }
 }
 
 TEST_CASE("a defect that needs a guess is left unchanged", "[mesh_repair]") {
