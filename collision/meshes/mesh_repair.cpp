@@ -108,6 +108,7 @@ class Repair {
     orient_faces();
     drop_unused_points();
     split_joined_points();
+    split_joined_edges();
     return changes();
   }
 
@@ -149,6 +150,8 @@ class Repair {
   bool fold_caps(const std::vector<ThinFace>& list, double tolerance);
   bool fold_thin_faces();
   void drop_duplicate_faces();
+  std::vector<std::pair<std::size_t, std::size_t>> pairs_to_remove(
+      const std::vector<std::pair<std::size_t, std::size_t>>& pairs, const std::vector<bool>& marked);
   void close_cracks();
   void orient_faces();
   std::vector<Shell> shells(std::span<const HalfEdge> half_edges, std::vector<bool>& flipped,
@@ -158,6 +161,7 @@ class Repair {
   std::vector<std::pair<const HalfEdge*, const HalfEdge*>> pair_around_edge(
       std::span<const HalfEdge> half_edges) const;
   void split_joined_points();
+  void split_joined_edges();
 
   double thin(const Face& face, std::size_t& longest) const;
 
@@ -201,6 +205,7 @@ void Repair::count_and_drop_unused_points() {
 void Repair::drop_unused_points() {
   const std::vector<bool> used = used_points();
   if (std::find(used.begin(), used.end(), false) == used.end()) return;
+  half_edges_.clear();
   store_numbers(soup_.vertex_numbers, soup_.vertices.size());
   std::vector<std::size_t> index(used.size(), kNone);
   std::size_t count = 0;
@@ -364,7 +369,12 @@ bool Repair::fold_caps(const std::vector<ThinFace>& list, double tolerance) {
     const auto across = std::find_if(first, last, [&](const HalfEdge& h) {
       return h.face != face_number && (h.forward != forward || count == 2);
     });
-    if (across == last) {  // a border: no neighbour needs the corner
+    // At a border no neighbour needs the corner. A face in excess of two at its edges closes nothing.
+    const auto is_odd = [&](std::size_t u, std::size_t v) {
+      const auto [from, to] = faces_along(u, v);
+      return (to - from) % 2;
+    };
+    if (across == last || is_odd(a, b) + is_odd(b, apex) + is_odd(apex, a) >= 2) {
       remove(f);
       continue;
     }
@@ -435,6 +445,9 @@ Face canonical(const Face& face) {
   return std::min(forward, backward);
 }
 
+/// Of several faces with the same corners and the same orientation one is kept. Two faces of opposite
+/// orientation are the wall between two solids that touch, or a part of a surface that occurs twice. Both are
+/// removed where removing one would leave edges with an odd number of faces.
 void Repair::drop_duplicate_faces() {
   // Duplicate faces have an edge with more than two faces, or with two of the same direction.
   std::vector<bool> suspect(soup_.faces.size(), false);
@@ -443,17 +456,76 @@ void Repair::drop_duplicate_faces() {
       return;
     for (const HalfEdge& half_edge : half_edges) suspect[half_edge.face] = true;
   });
-  bool drops = false;
-  std::map<Face, std::size_t> known;
+  struct Known {
+    std::size_t first, opposite = kNone;
+  };
+  const auto same_orientation = [&](std::size_t f, std::size_t g) {
+    const Face &a = soup_.faces[f], &b = soup_.faces[g];
+    const auto at = static_cast<std::size_t>(std::find(b.begin(), b.end(), a[0]) - b.begin());
+    return b[next(b, at)] == a[1];
+  };
+  std::map<Face, Known> known;
   std::vector<bool> marked(soup_.faces.size(), true);
-  for (std::size_t f = 0; f < soup_.faces.size(); ++f) {
-    if (!suspect[f]) continue;
-    marked[f] = known.emplace(canonical(soup_.faces[f]), f).second;
-    if (marked[f]) continue;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  bool drops = false;
+  const auto drop = [&](std::size_t f) {
+    marked[f] = false;
     drops = true;
     duplicate_.add([&] { return face_place(f); });
+  };
+  for (std::size_t f = 0; f < soup_.faces.size(); ++f) {
+    if (!suspect[f]) continue;
+    const auto [at, is_new] = known.try_emplace(canonical(soup_.faces[f]), Known{f});
+    if (is_new) continue;
+    Known& faces = at->second;
+    if (faces.opposite == kNone && !same_orientation(faces.first, f)) {
+      faces.opposite = f;
+      pairs.emplace_back(faces.first, f);
+    } else {
+      drop(f);
+    }
   }
+  for (const auto& [f, g] : pairs_to_remove(pairs, marked)) drop(f);
+  for (const auto& [f, g] : pairs)
+    if (marked[g]) drop(g);
   if (drops) keep_faces(marked);
+}
+
+/// Returns the pairs of opposite faces of which both must go. Pairs that share an edge are decided together.
+/// marked: the faces that remain if the pairs remain.
+std::vector<std::pair<std::size_t, std::size_t>> Repair::pairs_to_remove(
+    const std::vector<std::pair<std::size_t, std::size_t>>& pairs, const std::vector<bool>& marked) {
+  if (pairs.empty()) return {};
+  std::vector<std::size_t> pair_of(soup_.faces.size(), kNone);
+  for (std::size_t i = 0; i < pairs.size(); ++i) pair_of[pairs[i].first] = pair_of[pairs[i].second] = i;
+  Merged patch(pairs.size());
+  const auto each_edge = [&](const auto& use) {
+    std::vector<std::size_t> here;
+    for_each_edge(half_edges(), [&](std::span<const HalfEdge> at_edge) {
+      here.clear();
+      std::size_t faces = 0;
+      for (const HalfEdge& half_edge : at_edge) {
+        if (!marked[half_edge.face]) continue;
+        ++faces;
+        if (pair_of[half_edge.face] != kNone) here.push_back(pair_of[half_edge.face]);
+      }
+      if (!here.empty()) use(here, faces);
+    });
+  };
+  each_edge([&](const std::vector<std::size_t>& here, std::size_t) {
+    for (const std::size_t pair : here) patch.merge(here[0], pair);
+  });
+  // Number of odd edges that are left if one face of each pair goes, minus the number if both go.
+  std::vector<std::ptrdiff_t> odd(pairs.size(), 0);
+  each_edge([&](const std::vector<std::size_t>& here, std::size_t faces) {
+    const auto one_goes = static_cast<std::ptrdiff_t>((faces - here.size() / 2) % 2);
+    const auto both_go = static_cast<std::ptrdiff_t>((faces - here.size()) % 2);
+    odd[patch.of(here[0])] += one_goes - both_go;
+  });
+  std::vector<std::pair<std::size_t, std::size_t>> out;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (odd[patch.of(i)] > 0) out.push_back(pairs[i]);
+  return out;
 }
 
 /// Tests the ends of open edges only.
@@ -622,6 +694,7 @@ void Repair::orient_faces() {
     flipped_.add([&] { return face_place(f); });
     std::reverse(soup_.faces[f].begin(), soup_.faces[f].end());
   }
+  if (flipped_.any()) half_edges_.clear();
 }
 
 /// Pairs the faces around an edge so that each pair bounds a wedge of the solid. Returns no pair if the faces
@@ -713,6 +786,35 @@ void Repair::split_joined_points() {
       v = own->second;
     }
   if (split_.any()) half_edges_.clear();
+}
+
+/// If the faces at an edge are connected around both of its ends, no end can be split. Then each pair of
+/// faces but the first receives a point of its own in the middle of the edge.
+void Repair::split_joined_edges() {
+  std::vector<std::pair<HalfEdge, HalfEdge>> further;
+  for_each_edge(half_edges(), [&](std::span<const HalfEdge> at_edge) {
+    if (at_edge.size() <= 2) return;
+    const auto pairs = pair_around_edge(at_edge);
+    for (std::size_t i = 1; i < pairs.size(); ++i) further.emplace_back(*pairs[i].first, *pairs[i].second);
+  });
+  if (further.empty()) return;
+  half_edges_.clear();
+  store_numbers(soup_.vertex_numbers, soup_.vertices.size());
+  for (const auto& [a, b] : further) {
+    const std::size_t middle = soup_.vertices.size();
+    const Vector3d p = 0.5 * (soup_.vertices[a.edge.first] + soup_.vertices[a.edge.second]);
+    split_.add([&] { return "the edge at " + format_point(p); });
+    soup_.vertices.push_back(p);
+    soup_.vertex_numbers.push_back(soup_.vertex_numbers[a.edge.first]);
+    for (const HalfEdge& half_edge : {a, b}) {
+      Face& face = soup_.faces[half_edge.face];
+      const std::size_t from = half_edge.forward ? half_edge.edge.first : half_edge.edge.second;
+      const std::size_t to = half_edge.forward ? half_edge.edge.second : half_edge.edge.first;
+      std::size_t i = 0;
+      while (face[i] != from || face[next(face, i)] != to) ++i;
+      face.insert(face.begin() + static_cast<std::ptrdiff_t>(i) + 1, middle);
+    }
+  }
 }
 
 }  // namespace

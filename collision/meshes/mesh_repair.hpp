@@ -16,7 +16,9 @@ namespace wrenchd {
 /// - Removes faces without area until none is left. A corner on a side of another face becomes a corner of
 /// that
 ///   face.
-/// - Keeps one of several equal faces, whatever their orientation.
+/// - Keeps one of several equal faces. Removes both of two opposite faces where that leaves fewer open edges:
+/// the
+///   wall between two solids that touch.
 /// - Closes cracks that are no wider than rounding: merges the points along them.
 /// - Flips faces whose orientation differs from the majority of their shell.
 /// - Flips shells that face inwards and lie in no other shell, together with their contents.

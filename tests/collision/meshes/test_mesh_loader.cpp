@@ -66,7 +66,8 @@ TEST_CASE("an open mesh is rejected with the key that makes it a surface, and is
   const std::string hopeless = refusal_of(loader, none, BodyKind::solid);
   CHECK(hopeless.find("kind = \"surface\"") == std::string::npos);
   CHECK(refusal_of(loader, none, BodyKind::surface)
-            .find(none.string() + ": cannot be used, not even as a surface:\n  face 0 near ") == 0);
+            .find(none.string() +
+                  ": cannot be used, not even as a surface:\n  there is no face that has an area") == 0);
 }
 
 std::string off_of(const TriangleMesh& mesh) {

@@ -109,8 +109,52 @@ TEST_CASE("a face without area is removed and leaves no hole", "[mesh_repair]") 
   soup.vertices.emplace_back(1, 0, 0);
   soup.faces.push_back({0, 1, 8});
   soup.faces.push_back({8, 1, 0});
-  check_repaired(soup, {"removed 1 duplicate face: face 13 near (1, 0, 0)",
-                        "removed 1 face without area: face 12 near (0, 0, 0)"});
+  check_repaired(soup, {"removed 2 duplicate faces, first face 12 near (0, 0, 0)"});
+  soup.faces.pop_back();
+  check_repaired(soup, {"removed 1 face without area: face 12 near (0, 0, 0)"});
+}
+
+TEST_CASE("an edge with four faces that are connected around both ends is split in its middle",
+          "[mesh_repair]") {
+  // Four boxes around a square hole, as one surface: two of its opposite vertical edges meet in one edge.
+  // Built as the union of a U-shaped block and a block that touches it along an edge only.
+  PolygonSoup soup;
+  const auto add = [&](const Vector3d& low, const Vector3d& high) {
+    soup = concatenated(soup, box(low, high));
+  };
+  add({0, 0, 0}, {1, 1, 1});
+  add({1, 1, 0}, {2, 2, 1});   // touches the first box along the edge x = y = 1
+  add({0, 0, -1}, {1, 1, 0});  // below the first one
+  add({1, 0, -1}, {2, 1, 0});
+  add({1, 1, -1}, {2, 2, 0});  // below the second one: connects both
+  add({0, 0, 1}, {1, 1, 2});   // and the same above
+  add({1, 0, 1}, {2, 1, 2});
+  add({1, 1, 1}, {2, 2, 2});
+  const std::vector<std::string> changes = repair(soup);
+  REQUIRE_FALSE(changes.empty());
+  CHECK(changes.back().find("the edge at (1, 1, 0.5)") != std::string::npos);
+  const MeshReport report = check_solid(soup);
+  INFO((report.defects.empty() ? "" : report.defects[0]));
+  CHECK(report.solid());
+  CHECK(report.volume == Approx(8));
+}
+
+TEST_CASE("the wall between two solids that touch is removed", "[mesh_repair]") {
+  const PolygonSoup beside = box({2, 0, 0}, {4, 3, 5});
+  for (const bool triangles : {false, true}) {
+    PolygonSoup soup = concatenated(kBox, beside);
+    std::string what = "removed 2 duplicate faces, first face 1 near (2, 0, 0)";
+    if (triangles) {
+      // Both boxes divide the wall by the same diagonal.
+      std::erase(soup.faces, std::vector<std::size_t>{1, 3, 7, 5});
+      std::erase(soup.faces, std::vector<std::size_t>{8, 12, 14, 10});
+      for (const auto& face :
+           std::vector<std::vector<std::size_t>>{{1, 3, 7}, {1, 7, 5}, {8, 14, 10}, {8, 12, 14}})
+        soup.faces.push_back(face);
+      what = "removed 4 duplicate faces, first face 10 near (2, 0, 0)";
+    }
+    check_repaired(soup, {"merged 4 duplicate points, first vertex 8 at (2, 0, 0)", what}, 60);
+  }
 }
 
 TEST_CASE("a needle is closed", "[mesh_repair]") {
