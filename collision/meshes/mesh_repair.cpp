@@ -109,6 +109,7 @@ class Repair {
     drop_unused_points();
     split_joined_points();
     split_joined_edges();
+    split_joined_points();  // an edge may have joined two fans
     return changes();
   }
 
