@@ -32,7 +32,7 @@ SolidProperties properties(const TriangleMesh& mesh, const ConvexBody& hull, con
     case InertiaSource::solid:
       return solid_properties(mesh, settings.mass_kg);
     case InertiaSource::hull:
-      return solid_properties(surface_of(hull), settings.mass_kg);
+      return solid_properties(hull_surface(hull), settings.mass_kg);
     case InertiaSource::shell:
       return shell_properties(mesh, settings.mass_kg, settings.shell_thickness_m);
     case InertiaSource::given:

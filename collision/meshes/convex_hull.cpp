@@ -95,7 +95,7 @@ double volume(const ConvexBody& body) {
   return sixfold / 6.0;
 }
 
-TriangleMesh surface_of(const ConvexBody& body) {
+TriangleMesh hull_surface(const ConvexBody& body) {
   TriangleMesh mesh{body.vertices_T_m, {}};
   Vector3d middle = Vector3d::Zero();
   for (const Vector3d& p : body.vertices_T_m) middle += p / static_cast<double>(body.vertices_T_m.size());

@@ -18,6 +18,6 @@ ConvexBody convex_hull(std::span<const Vector3d> points_T_m);
 double volume(const ConvexBody& body);
 
 /// Returns the surface of a convex body: its triangles, outward. Not RT-safe: allocates.
-TriangleMesh surface_of(const ConvexBody& body);
+TriangleMesh hull_surface(const ConvexBody& body);
 
 }  // namespace wrenchd
