@@ -135,6 +135,34 @@ std::unique_ptr<SimulatedLink> make_scripted_link(const RunConfig& config, const
   return link;
 }
 
+/// Runs the loop with a simulated device. If a script unplugs the device, waits until it can be opened again,
+/// as for a real device; it is disarmed then. `run_once` runs the loop until it ends.
+Fault run_with_reconnection(Runtime& runtime, const RunContext& context, Clock& clock, TimePoint end,
+                            ScheduledRequests& requests, const std::function<Fault()>& run_once) {
+  constexpr Duration kOpenPeriod = std::chrono::milliseconds(1);
+  const auto opened = [&] {
+    try {
+      runtime.open();
+      return true;
+    } catch (const std::runtime_error&) {  // the script still keeps the device unplugged
+      return false;
+    }
+  };
+  for (;;) {
+    const Fault fault = run_once();
+    if (fault != Fault::device_lost) return fault;
+    runtime.close();
+    requests.cancel_arm();
+    spdlog::info("the simulated device was unplugged; waiting for it");
+    context.service.waiting("the device was unplugged");
+    while (!opened()) {
+      if (context.signals.stop_requested() || clock.now() >= end) return Fault::none;
+      clock.sleep_until(clock.now() + kOpenPeriod);
+    }
+    spdlog::info("the device is connected again, and is disarmed");
+  }
+}
+
 Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
                                     const LoopbackScript& script) {
   VirtualClock clock;
@@ -143,9 +171,11 @@ Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
                      [&](Runtime& runtime, Recordings& recordings, LiveView& view) {
                        runtime.open();
                        log_missing_motors(runtime.config().profile);
-                       return run_in_virtual_time(
-                           runtime, context, recordings, end_time(context.options, clock), clock, view,
-                           ScheduledRequests(context.options.arm, script.commands, clock.now()));
+                       const TimePoint end = end_time(context.options, clock);
+                       ScheduledRequests requests(context.options.arm, script.commands, clock.now());
+                       return run_with_reconnection(runtime, context, clock, end, requests, [&] {
+                         return run_in_virtual_time(runtime, context, recordings, end, clock, view, requests);
+                       });
                      });
 }
 
@@ -162,9 +192,15 @@ Fault run_simulated_in_wall_time(RunConfig config, const RunContext& context, co
       std::move(config), context, *link, clock, [&](Runtime& runtime, Recordings&, LiveView& view) {
         runtime.open();
         log_missing_motors(runtime.config().profile);
-        return run_in_wall_time(runtime, context, runtime.config().profile.name + ", simulated",
-                                end_time(context.options, clock), clock, view,
-                                ScheduledRequests(context.options.arm, script.commands, clock.now()));
+        const TimePoint end = end_time(context.options, clock);
+        ScheduledRequests requests(context.options.arm, script.commands, clock.now());
+        const auto run_once = [&] {
+          return run_in_wall_time(runtime, context, runtime.config().profile.name + ", simulated", end, clock,
+                                  view, requests);
+        };
+        // The process at the other end of a socket cannot come back over the same socket.
+        if (context.options.link_fd >= 0) return run_once();
+        return run_with_reconnection(runtime, context, clock, end, requests, run_once);
       });
 }
 

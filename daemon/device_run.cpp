@@ -27,7 +27,7 @@ Fault run_with_device(Runtime& runtime, const RunContext& context, const Reconne
       if (stop()) return Fault::none;
       continue;
     }
-    const ScheduledRequests requests(context.options.arm && at_start && not_armed.empty(), {}, clock.now());
+    ScheduledRequests requests(context.options.arm && at_start && not_armed.empty(), {}, clock.now());
     const Fault fault = run_in_wall_time(runtime, context, profile.name + ", " + describe(device), end, clock,
                                          view, requests);
     if (fault == Fault::device_lost) waiting("the device was unplugged");

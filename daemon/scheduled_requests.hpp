@@ -20,6 +20,8 @@ class ScheduledRequests {
 
   /// Sends to the loop what is due at `now`.
   void send_due(ServoLoop& loop, TimePoint now);
+  /// Does not arm any more: a device that was unplugged comes back disarmed.
+  void cancel_arm() noexcept { arm_ = false; }
   /// Returns the time of the next command, or `limit` if that is earlier.
   TimePoint next_time(TimePoint limit) const;
 

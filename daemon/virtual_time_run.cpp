@@ -6,7 +6,7 @@
 namespace wrenchd {
 
 Fault run_in_virtual_time(Runtime& runtime, const RunContext& context, Recordings& recordings, TimePoint end,
-                          VirtualClock& clock, LiveView& view, ScheduledRequests requests) {
+                          VirtualClock& clock, LiveView& view, ScheduledRequests& requests) {
   ServoLoop& loop = runtime.loop();
   const Duration period = from_seconds(1.0 / runtime.config().settings.servo.rate_Hz);
   TimePoint next_sample = clock.now() + kSamplePeriod;

@@ -13,6 +13,6 @@ namespace wrenchd {
 /// Every run with the same input gives the same ticks. Releases the hand at the end. Returns the fault that
 /// latched the loop or ended the run, else Fault::none. Not RT-safe: returns when the run is over.
 Fault run_in_virtual_time(Runtime& runtime, const RunContext& context, Recordings& recordings, TimePoint end,
-                          VirtualClock& clock, LiveView& view, ScheduledRequests requests);
+                          VirtualClock& clock, LiveView& view, ScheduledRequests& requests);
 
 }  // namespace wrenchd

@@ -101,7 +101,7 @@ class ContactRateLog {
 }  // namespace
 
 Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::string& device, TimePoint end,
-                       WallClock& clock, LiveView& view, ScheduledRequests requests) {
+                       WallClock& clock, LiveView& view, ScheduledRequests& requests) {
   ServoLoop& loop = runtime.loop();
   ServoThread servo_thread(runtime, clock, context.service);
   log_grants(servo_thread.grants());

@@ -18,6 +18,6 @@ namespace wrenchd {
 /// Throws RealtimeError if real time is required and the kernel denies it. Not RT-safe: returns when the run
 /// is over.
 Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::string& device, TimePoint end,
-                       WallClock& clock, LiveView& view, ScheduledRequests requests);
+                       WallClock& clock, LiveView& view, ScheduledRequests& requests);
 
 }  // namespace wrenchd

@@ -25,6 +25,13 @@ bool says(const ProgramResult& result, const std::string& text) {
   return result.err.find(text) != std::string::npos;
 }
 
+int count(const ProgramResult& result, const std::string& text) {
+  int found = 0;
+  for (std::size_t at = result.err.find(text); at != std::string::npos; at = result.err.find(text, at + 1))
+    ++found;
+  return found;
+}
+
 TEST_CASE("all commands of a script are read, sorted by time", "[loopback_script]") {
   const TemporaryDirectory dir;
   const LoopbackScript script = load_loopback_script(dir.write("s.toml", R"(
@@ -123,6 +130,52 @@ TEST_CASE("a stop, a stall and a client without heartbeats each have their exit 
       run_program("wrenchd", {"--virtual-time", "--seconds", "4", "--loopback-script", file.string()});
   CHECK(says(alone, "heartbeat_missing: the client that armed has never sent a heartbeat"));
   CHECK(alone.exit_code == 0);
+}
+
+constexpr const char* kUnplugged = R"(
+[[fault]]
+at_s = 2.0
+for_s = 0.2
+kind = "unplug"
+
+[[command]]
+at_s = 3.5
+command = "arm"
+)";
+
+TEST_CASE("an unplugged simulated device comes back disarmed", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  for (const char* profile : {"loopback", "polhem"}) {
+    const auto run = run_script(dir, kUnplugged, "5", {"--simulate", profile});
+    INFO(profile << "\n" << run.err);
+    CHECK(run.exit_code == 0);
+    CHECK(says(run, "device_lost"));
+    CHECK(says(run, "the device is connected again, and is disarmed"));
+    // Armed by --arm, tested again after the reconnection, then armed by the script only.
+    for (const char* state : {"state: self-test", "state: disarmed", "state: waiting"}) {
+      INFO(state);
+      CHECK(count(run, state) == 2);
+    }
+  }
+}
+
+TEST_CASE("a run ends while its simulated device is unplugged", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const auto run = run_script(dir, "[[fault]]\nat_s = 2.0\nfor_s = 60.0\nkind = \"unplug\"\n", "4");
+  INFO(run.err);
+  CHECK(run.exit_code == 0);
+  CHECK(says(run, "device_lost"));
+  CHECK_FALSE(says(run, "connected again"));
+}
+
+TEST_CASE("an unplugged simulated device comes back disarmed in wall time", "[loopback_script][wall_time]") {
+  const TemporaryDirectory dir;
+  const fs::path file = dir.write("script.toml", kUnplugged);
+  const auto run = run_program("wrenchd", {"--realtime", "off", "--control", "none", "--seconds", "4",
+                                           "--loopback-script", file.string()});
+  INFO(run.err);
+  CHECK(run.exit_code == 0);
+  CHECK(says(run, "the device is connected again, and is disarmed"));
 }
 
 TEST_CASE("a script requires a simulated device that supports its faults", "[loopback_script]") {
