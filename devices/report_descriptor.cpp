@@ -88,8 +88,8 @@ struct GlobalState {
   Extent logical_min, logical_max, physical_min, physical_max;
   std::uint32_t unit = 0;
   int unit_exponent = 0;
-  std::optional<std::uint32_t> report_size;
-  std::optional<std::uint32_t> report_count;
+  std::uint32_t report_size = 0;  ///< 0 until the first Report Size: Linux then adds no field
+  std::uint32_t report_count = 0;
   std::optional<std::uint8_t> report_id;
 };
 
@@ -185,11 +185,9 @@ class DescriptorParser {
 
   void declare(const Item& item, ReportKind kind) {
     if (open_.empty()) reject(item, "declares a field outside every collection");
-    if (!global_.report_size) reject(item, "declares a field before any Report Size");
-    if (!global_.report_count) reject(item, "declares a field before any Report Count");
     DescribedField field;
-    field.bits = *global_.report_size;
-    field.count = *global_.report_count;
+    field.bits = global_.report_size;
+    field.count = global_.report_count;
     if (field.bits == 0 || field.count == 0) return;  // no field
     const std::size_t index = report_of(item, kind);
     DescribedReport& report = found_.reports[index];

@@ -111,7 +111,8 @@ class DescriptorError : public std::runtime_error {
 ///
 /// If HID 1.11 is ambiguous, the parser follows Linux, so that the check agrees with the kernel: a maximum is
 /// unsigned unless the minimum is negative; a usage takes the page that is current when its field is
-/// declared; of alternatives between delimiters it uses the first; it skips items with reserved tags. It is
+/// declared; of alternatives between delimiters it uses the first; it skips items with reserved tags; a field
+/// without a Report Size or a Report Count has no bits. It is
 /// stricter than Linux in these cases: it rejects a field outside every collection, a push without a pop,
 /// half a usage range, and reports with and without ids in one descriptor. Not RT-safe: allocates.
 ReportDescriptor parse_report_descriptor(std::span<const std::uint8_t> bytes);

@@ -239,8 +239,8 @@ TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[re
            {framed("81 02 a1 00"), "byte 21: 1 collection(s) are still open"},
            {"05 01 c0", "byte 2: ends a collection, but none is open"},
            {"75 08 95 01 81 02", "byte 4: declares a field outside every collection"},
-           {"a1 01 95 01 81 02 c0", "byte 4: declares a field before any Report Size"},
-           {"a1 01 75 08 81 02 c0", "byte 4: declares a field before any Report Count"},
+           {"a1 01 95 01 81 02 c0", "byte 7: it declares no report"},
+           {"a1 01 75 08 81 02 c0", "byte 7: it declares no report"},
            {framed("81 02 a4"), "byte 20: 1 push(es) without a pop"},
            {framed("b4 81 02"), "byte 16: is a pop without a push"},
            {framed(pushes), "byte 32: pushes are nested more than 16 deep"},
@@ -274,6 +274,19 @@ TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[re
     const std::string message = parse_error(from_hex(bad.hex));
     INFO(message);
     CHECK(message.find(bad.message) != std::string::npos);
+  }
+}
+
+// Tablets declare a field before the first Report Size. In Linux the size is 0 until it is set.
+TEST_CASE("a field before any Report Size or Report Count has no bits, as in Linux", "[report_descriptor]") {
+  for (const char* empty_field : {"81 02", "95 01 81 02", "75 08 81 02", "09 30 95 02 b1 03"}) {
+    const ReportDescriptor descriptor = parse_report_descriptor(from_hex(
+        "05 01 09 08 a1 01 " + std::string(empty_field) + " 09 31 15 00 26 ff 00 75 08 95 02 81 02 c0"));
+    REQUIRE(descriptor.reports.size() == 1);
+    REQUIRE(descriptor.reports[0].fields.size() == 1);
+    CHECK(descriptor.reports[0].length == 2);
+    CHECK(descriptor.reports[0].fields[0].bit == 0);
+    CHECK(descriptor.reports[0].fields[0].usage(0) == Usage{0x01, 0x31});
   }
 }
 
