@@ -37,6 +37,9 @@ class ReportLink {
   virtual LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept = 0;
   /// Sleeps until a report is waiting or the deadline has passed. RT-safe except for the intended sleep.
   virtual void wait_readable(TimePoint deadline) noexcept = 0;
+  /// Returns true if the report descriptor of the device declares this input report. False also if there is
+  /// no descriptor. RT-safe.
+  virtual bool declares(std::span<const std::uint8_t> /*report*/) const noexcept { return false; }
   /// Closes the transport; has no effect when closed. Not RT-safe: may wait for the last write.
   virtual void close() noexcept = 0;
 };

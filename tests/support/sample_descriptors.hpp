@@ -67,6 +67,16 @@ inline Bytes space_mouse_wireless() {
   return from_hex(kCombinedAxes + kButtonsAndLed + kBattery + kMakersFeatures + "c0 c0");
 }
 
+/// SpaceMouse Enterprise (256f:c633), without its feature reports: 31 buttons in report 3, numbers of pressed
+/// keys in report 0x1c, two LEDs in report 4.
+inline Bytes space_mouse_enterprise() {
+  return from_hex(
+      kCombinedAxes +
+      "a1 02 85 03 05 01 05 09 19 01 29 1f 15 00 25 01 35 00 45 01 75 01 95 1f 81 02 95 01 81 03 c0"
+      "a1 02 85 1c 05 01 05 09 19 00 2a ff 00 15 00 26 ff 00 35 00 46 ff 00 75 10 95 06 81 00 c0"
+      "a1 02 85 04 05 08 09 4b 09 4c 15 00 25 01 95 02 75 01 91 02 95 01 75 06 91 03 c0 c0");
+}
+
 /// A home-made firmware under the id of a SpaceMouse Pro, which splits the axes; this firmware combines them.
 /// 32 buttons.
 inline Bytes home_made_combined() {
