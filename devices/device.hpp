@@ -14,7 +14,7 @@ namespace wrenchd {
 /// Newest state of a device. Frames: B = device base, H = handle frame.
 struct DeviceSample {
   Pose X_BH;                   ///< handle pose
-  Twist V_BH;                  ///< velocity of the handle point, in B; zero if the device does not report it
+  Twist V_BH;                  ///< velocity of the handle point, in B: reported by the device or estimated
   double device_time_s = 0.0;  ///< time of the device clock, unwrapped
   std::uint64_t sequence = 0;  ///< sequence number of the report, unwrapped
   /// Sequence number of the last command that the device accepted, unwrapped.
@@ -32,6 +32,8 @@ struct DeviceSample {
   bool homed = true;  ///< true if the encoders have found their zero; until then no sample is fresh
   DofMask sensed_dofs = kAllDofs;  ///< degrees of freedom whose motion the device reports; the pose is
                                    ///< constant along the others
+  /// Degrees of freedom whose velocity wrenchd estimates from the poses; the device reports the others.
+  DofMask estimated_velocity_dofs = kNoDof;
   DofMask driven_dofs = kAllDofs;  ///< degrees of freedom with a motor
   /// Nonzero components of the last wrench without a motor; the device did not apply them.
   DofMask dropped_dofs = kNoDof;

@@ -273,7 +273,7 @@ void Homing::track_motion(const DeviceSample& sample, const Pose& X_BH) noexcept
   if (largest >= travel) finish_axis(static_cast<std::size_t>(moved), displacement[moved] > 0.0);
 }
 
-/// A device that reports no velocities sends zeros, which do not count.
+/// Only a reported velocity counts: an estimate follows from the poses and lags them.
 void Homing::compare_velocity(const DeviceSample& sample, const Pose& X_BH) noexcept {
   const double elapsed_s = sample.device_time_s - previous_time_s_;
   if (previous_pose_ && elapsed_s > 0.0) {
@@ -282,7 +282,8 @@ void Homing::compare_velocity(const DeviceSample& sample, const Pose& X_BH) noex
     const auto axis = static_cast<Eigen::Index>(state_.axis);
     const double min_speed = state_.axis < 3 ? kMinSpeed_m_per_s : kMinSpeed_rad_per_s;
     const double differenced = displacement_between(*previous_pose_, X_BH)[axis] / elapsed_s;
-    if (std::abs(V[axis]) > min_speed && std::abs(differenced) > min_speed)
+    const bool reported = (sample.estimated_velocity_dofs >> state_.axis & 1) == 0;
+    if (reported && std::abs(V[axis]) > min_speed && std::abs(differenced) > min_speed)
       ++((V[axis] > 0.0) == (differenced > 0.0) ? velocity_matches_ : velocity_mismatches_);
   }
   previous_pose_ = X_BH;

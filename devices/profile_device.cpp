@@ -106,10 +106,12 @@ void ProfileDevice::open() {
     deflection_.emplace(*profile_.deflection, profile_.max_linear_speed_m_per_s,
                         profile_.max_angular_speed_rad_per_s);
   silent_since_.reset();
-  previous_pose_.reset();
+  velocity_ = VelocityEstimator(velocity_estimator_settings(profile_));
+  estimated_velocity_dofs_ = estimated_velocity_dofs(profile_);
   acknowledged_.reset();
   sent_before_open_ = commands_sent_;
   report_received_ = disconnected_ = kinematics_valid_ = false;
+  trusted_reports_ = 0;
   layouts_since_open_ = 0;
   overspeed_samples_ = 0;
   open_ = true;
@@ -120,7 +122,7 @@ void ProfileDevice::recalibrate(const DeviceProfile& calibrated) noexcept {
   profile_.X_EH = calibrated.X_EH;
   profile_.kinematics.zero_rad = calibrated.kinematics.zero_rad;
   same_frames_ = same_bits(profile_.X_BD, {}) && same_bits(profile_.X_EH, {});
-  previous_pose_.reset();
+  forget_motion();
   kinematics_valid_ = false;
 }
 
@@ -160,8 +162,10 @@ void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
   sample_ = {};
   sample_.sensed_dofs = sensed_dofs(profile_);
   sample_.driven_dofs = driven_dofs(profile_);
+  sample_.estimated_velocity_dofs = estimated_velocity_dofs_;
   report_received_ = false;
   layouts_since_open_ = 0;
+  trusted_reports_ = 0;
   state_ = {};
   if (deflection_) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
   silent_since_ = deflection_time_ = now;
@@ -175,6 +179,7 @@ void ProfileDevice::prompt_device(TimePoint now) noexcept {
   if (!open_ || disconnected_ || (!lock_step && profile_.keep_alive.bytes.empty())) return;
   if (now - prompted_at_ < (lock_step ? kLockStepTimeout : from_seconds(profile_.keep_alive_period_s)))
     return;
+  if (!lock_step && !trusted()) return;
   prompted_at_ = now;
   if (!lock_step)
     transmit(now, profile_.keep_alive.bytes);
@@ -201,12 +206,31 @@ std::optional<ProfileDevice::Arrival> ProfileDevice::drain(TimePoint now) noexce
     const PoseReportLayout* matching = nullptr;
     if (read.length <= buffer.size()) matching = decode_report(bytes, read.arrived);
     if (matching == nullptr) {
+      if (is_other_report(bytes)) continue;
       ++sample_.rejected;
+      judge(false);
       continue;
     }
+    judge(true);
     newest = Arrival{matching, read.arrived};
   }
   return newest;
+}
+
+/// A device may number its reports and declare some that the profile does not need, such as keys.
+bool ProfileDevice::is_other_report(std::span<const std::uint8_t> bytes) const noexcept {
+  for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
+    const PoseReportLayout& known = *layout(i);
+    if (!known.has_id || bytes.empty() || known.id == bytes[0]) return false;
+  }
+  return link_.declares(bytes);
+}
+
+/// One valid report is enough for a device without motors: it gets its shutdown report only.
+void ProfileDevice::judge(bool valid) noexcept {
+  if (trusted()) return;
+  const int next = profile_.has_output ? trusted_reports_ + 1 : kTrustReports;
+  trusted_reports_ = valid ? next : 0;
 }
 
 /// Finds the layout of a report and decodes it into state_. A second report of the same layout in one read
@@ -258,7 +282,7 @@ bool ProfileDevice::accept_counters(const PoseReportLayout& layout, const PoseRe
   }
   if (after_silence) {
     sample_.fault = Fault::sample_stale;
-    previous_pose_.reset();  // no pose to compare motion with
+    forget_motion();
   }
   sequence_ = report.sequence;
   device_time_ = report.device_time;
@@ -273,7 +297,7 @@ void ProfileDevice::update_sample(const Arrival& newest) noexcept {
   sample_.buttons = state_.buttons;
   if (newest.layout->motors_on.present) sample_.motors_on = state_.motors_on;
   sample_.watchdog_tripped = state_.watchdog_tripped;
-  if (!state_.homed) previous_pose_.reset();  // the zero of the encoders is about to change
+  if (!state_.homed) forget_motion();  // the zero of the encoders is about to change
   sample_.homed = state_.homed;
   if (deflection_ || !state_.homed || (layouts_since_open_ & pose_layouts_) != pose_layouts_ ||
       (layouts_this_read_ & pose_layouts_) == 0) {
@@ -285,11 +309,34 @@ void ProfileDevice::update_sample(const Arrival& newest) noexcept {
   Fault fault = compute_pose(report);
   if (fault == Fault::none) fault = validate_pose(report);
   if (fault != Fault::none) {
+    velocity_.reset();
+    judge(false);
     sample_.fault = fault;
     return;
   }
   sample_.X_BH = *previous_pose_;
+  estimate_velocity(report.V_BH);
   sample_.V_BH = report.V_BH;
+}
+
+void ProfileDevice::forget_motion() noexcept {
+  previous_pose_.reset();
+  velocity_.reset();
+}
+
+/// The lever from E to H has moved a reported linear velocity by a reported angular velocity only.
+void ProfileDevice::estimate_velocity(Twist& V_BH) noexcept {
+  if (estimated_velocity_dofs_ == kNoDof) return;
+  const Twist estimate = velocity_.update(sample_.device_time_s, sample_.X_BH);
+  if ((estimated_velocity_dofs_ & kAngularDofs) != 0) {
+    V_BH.angular_rad_per_s = estimate.angular_rad_per_s;
+    if (!same_frames_) {
+      const Vector3d lever_B_m =
+          sample_.X_BH.rotation * (inverse(profile_.X_EH).rotation * profile_.X_EH.translation_m);
+      V_BH.linear_m_per_s += V_BH.angular_rad_per_s.cross(lever_B_m);
+    }
+  }
+  if ((estimated_velocity_dofs_ & kLinearDofs) != 0) V_BH.linear_m_per_s = estimate.linear_m_per_s;
 }
 
 Fault ProfileDevice::compute_pose(PoseReport& report) noexcept {
@@ -435,8 +482,12 @@ void ProfileDevice::fill_wrench(const Wrench& F_B, WrenchReport& report) const n
 Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexcept {
   if (!open_) return Fault::device_lost;
   if (!profile_.has_output) return Fault::none;
+  if (!trusted()) {
+    if (profile_.stream != StreamStyle::lock_step) return Fault::none;
+    motors_on = false;
+  }
   WrenchReport report;
-  fill_wrench(F, report);
+  if (motors_on) fill_wrench(F, report);
   report.hold_time_s =
       std::max(profile_.watchdog_s,
                profile_.wrench_report.hold_time.step);  // 0 would select the default of the device
@@ -462,7 +513,7 @@ Fault ProfileDevice::transmit(TimePoint now, std::span<const std::uint8_t> bytes
 
 void ProfileDevice::release(TimePoint now) noexcept {
   for (int i = 0; i < kReleaseReports; ++i) send(now, {}, false);
-  if (open_ && !profile_.shutdown.bytes.empty()) transmit(now, profile_.shutdown.bytes);
+  if (open_ && trusted() && !profile_.shutdown.bytes.empty()) transmit(now, profile_.shutdown.bytes);
 }
 
 }  // namespace wrenchd

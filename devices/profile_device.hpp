@@ -13,6 +13,7 @@
 #include "devices/links/report_link.hpp"
 #include "devices/pose_observer.hpp"
 #include "devices/report_codec.hpp"
+#include "devices/velocity_estimator.hpp"
 
 namespace wrenchd {
 
@@ -21,10 +22,13 @@ namespace wrenchd {
 /// validates the result.
 ///
 /// A device may have fewer than six degrees of freedom. Along axes without a sensor the pose is constant.
-/// Wrench components without a motor are dropped. DeviceSample lists both.
+/// Wrench components without a motor are dropped. DeviceSample lists both. A velocity that the device does
+/// not report is estimated from its poses (VelocityEstimator).
 ///
-/// A lock-step device sends only after it has received a command. ProfileDevice sends it zeros after open(),
-/// and again whenever it has been silent for kLockStepTimeout.
+/// ProfileDevice writes nothing to a device before kTrustReports valid reports in a row have shown that its
+/// reports are those of the profile. Exception: a lock-step device sends only after it has received a
+/// command. ProfileDevice sends it zeros with the motors off after open(), and again whenever it has been
+/// silent for kLockStepTimeout. match_profile() decides which devices may get them.
 ///
 /// A sample carries the fault that its read found. ProfileDevice does not latch faults: the caller decides on
 /// the reaction, and a later valid report gives a valid sample.
@@ -37,6 +41,8 @@ class ProfileDevice final : public Device {
   static constexpr int kMaxReportsPerRead = 64;
   /// Number of zero commands of release(), so that the loss of one has no effect.
   static constexpr int kReleaseReports = 5;
+  /// Valid reports in a row after which a device with motors is trusted to be that of the profile.
+  static constexpr int kTrustReports = 5;
   /// Factor of the limits for a device without a watchdog, because then only the host can release the device.
   static constexpr double kAuthorityWithoutWatchdog = 0.25;
   /// Silence of a lock-step device after which ProfileDevice sends a command again.
@@ -64,6 +70,10 @@ class ProfileDevice final : public Device {
 
   const DeviceProfile& profile() const noexcept { return profile_; }
   std::uint64_t commands_sent() const noexcept override { return commands_sent_; }
+  /// Returns true if the reports since open() have been those of the profile. RT-safe.
+  bool trusted() const noexcept { return trusted_reports_ >= kTrustReports; }
+  /// Trusts a far end that is no device, until the next open(): a tool that only encodes commands. RT-safe.
+  void assume_trusted() noexcept { trusted_reports_ = kTrustReports; }
 
   /// Returns the joint angles of the last valid sample, if the device has joints. RT-safe.
   const JointAngles& joint_angles() const noexcept { return joint_angles_; }
@@ -94,9 +104,17 @@ class ProfileDevice final : public Device {
   Fault compute_pose(PoseReport& report) noexcept;
   Fault validate_pose(PoseReport report) noexcept;
   Fault validate_motion(const PoseReport& report) noexcept;
+  /// Discards the poses before a gap, a fault or a change of the frames.
+  void forget_motion() noexcept;
+  /// Replaces the components of V that the device does not report by their estimates.
+  void estimate_velocity(Twist& V_BH) noexcept;
   void integrate_deflection(TimePoint now) noexcept;
   void apply_deflection(const PoseReport& report) noexcept;
   void prompt_device(TimePoint now) noexcept;
+  /// Returns true if the device declares a report that no layout of the profile describes.
+  bool is_other_report(std::span<const std::uint8_t> bytes) const noexcept;
+  /// Counts the evidence that the device is that of the profile, until it is trusted.
+  void judge(bool valid) noexcept;
 
   Fault send(TimePoint now, const Wrench& F, bool motors_on) noexcept;
   Fault transmit(TimePoint now, std::span<const std::uint8_t> bytes) noexcept;
@@ -129,6 +147,9 @@ class ProfileDevice final : public Device {
   std::optional<Pose> previous_pose_;          ///< last valid pose, also if it jumped
   double previous_pose_time_s_ = 0.0;          ///< device time of previous_pose_
   int overspeed_samples_ = 0;                  ///< consecutive samples above the speed limit
+  int trusted_reports_ = 0;                    ///< valid reports in a row, at most kTrustReports
+  VelocityEstimator velocity_;
+  DofMask estimated_velocity_dofs_ = kNoDof;
 
   JointAngles joint_angles_{};     ///< angles of the last sample, if the device has joints
   Pose X_DE_;                      ///< pose of E at joint_angles_

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "devices/deflection_pose.hpp"
 #include "devices/kinematics.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/report_bits.hpp"
@@ -127,10 +128,12 @@ void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseRepo
   if (layout.rotation.present) lines.add("rotation in base", R_BD * report.rotation_rad, "rad");
   if (profile.deflection && profile.deflection->mode == Deflection::Mode::rate) {
     const Deflection& d = *profile.deflection;
+    const SteeringCurve linear(d, d.linear_gain, d.full_deflection_m);
+    const SteeringCurve angular(d, d.angular_gain, d.full_deflection_rad);
     if (layout.translation.present)
-      lines.add("tool velocity", d.linear_gain * (R_BD * report.translation_m), "m/s");
+      lines.add("tool velocity", linear.velocity(R_BD * report.translation_m), "m/s");
     if (layout.rotation.present)
-      lines.add("tool angular vel.", d.angular_gain * (R_BD * report.rotation_rad), "rad/s");
+      lines.add("tool angular vel.", angular.velocity(R_BD * report.rotation_rad), "rad/s");
   }
   if (layout.buttons.present || !layout.button_bits.empty() ||
       (layout.joints.present && profile.kinematics.count_button.present))
@@ -288,6 +291,7 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
   TimePoint now{};
   device.open();
   device.read_newest(now);
+  device.assume_trusted();
   if (!at.empty() || joints) {
     const Bytes given = without_wrapping(profile, at);
     link.waiting = at.empty() ? home_report(profile) : std::vector<std::uint8_t>(given.begin(), given.end());

@@ -65,6 +65,7 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   sample.X_BH = pose_from_numbers(r.X_BH);
   sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
   sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
+  sample.estimated_velocity_dofs = r.estimated_velocity_dofs;
   sample.device_time_s = r.device_time_s;
   sample.sequence = r.sequence;
   sample.acknowledged = r.acknowledged_command;

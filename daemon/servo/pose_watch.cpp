@@ -39,8 +39,11 @@ FaultSet PoseWatch::check(const DeviceSample& sample) noexcept {
 
 bool PoseWatch::pose_stuck(const DeviceSample& sample) noexcept {
   const double now_s = sample.device_time_s;
-  const double v_m_per_s = sample.V_BH.linear_m_per_s.norm(),
-               w_rad_per_s = sample.V_BH.angular_rad_per_s.norm();
+  const auto reported = [&](DofMask dofs) {
+    return (sample.estimated_velocity_dofs & dofs) == 0 ? 1.0 : 0.0;
+  };
+  const double v_m_per_s = reported(kLinearDofs) * sample.V_BH.linear_m_per_s.norm(),
+               w_rad_per_s = reported(kAngularDofs) * sample.V_BH.angular_rad_per_s.norm();
   const bool at_rest = v_m_per_s < kRest_m_per_s && w_rad_per_s < kRest_rad_per_s;
   if (!has_reference_ || at_rest || !same_bits(sample.X_BH, X_BH_reference_) || now_s < last_sample_time_s_) {
     X_BH_reference_ = sample.X_BH;

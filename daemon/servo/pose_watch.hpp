@@ -8,8 +8,8 @@
 
 namespace wrenchd {
 
-/// Detects implausible poses: no valid rotation, far outside the workspace, or constant while the twist is
-/// not.
+/// Detects implausible poses: no valid rotation, far outside the workspace, or constant while the reported
+/// twist is not. An estimated twist is no evidence, because it follows from the poses.
 class PoseWatch {
  public:
   /// RT-safe.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/finite.hpp"
+#include "devices/velocity_estimator.hpp"
 
 namespace wrenchd {
 namespace {
@@ -33,6 +34,11 @@ EncoderStep stated_encoder_step(const DeviceProfile& profile) {
   return {stated_or_zero(profile.encoder_step_m), stated_or_zero(profile.encoder_step_rad)};
 }
 
+/// Factor by which a damper on the velocity along these degrees of freedom counts.
+double velocity_gain(const DeviceProfile& profile, DofMask dofs) {
+  return (estimated_velocity_dofs(profile) & dofs) != 0 ? kEstimateGain : 1.0;
+}
+
 }  // namespace
 
 StabilityAnalysis::StabilityAnalysis(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
@@ -44,7 +50,9 @@ StabilityAnalysis::StabilityAnalysis(const Settings& settings, const DeviceProfi
       driven_(driven_dofs(profile)),
       period_s_(1.0 / settings.servo.rate_Hz),
       max_linear_N_per_m_(profile.max_stiffness_N_per_m),
-      max_angular_Nm_per_rad_(profile.max_stiffness_Nm_per_rad) {
+      max_angular_Nm_per_rad_(profile.max_stiffness_Nm_per_rad),
+      linear_velocity_gain_(velocity_gain(profile, kLinearDofs)),
+      angular_velocity_gain_(velocity_gain(profile, kAngularDofs)) {
   compute_scale({period_s_, period_s_}, 1.0);  // throws here, before the loop runs, if the gains are invalid
 }
 
@@ -85,13 +93,14 @@ StiffnessScale StabilityAnalysis::max_stable_scale(const LoopMeasurement& measur
 double StabilityAnalysis::max_stable_scale_at_handle(const LoopMeasurement& measured,
                                                      const LocalModels::TotalGains& gains) const noexcept {
   const double lag_s = 0.5 * std::max(measured.longest_period_s(), period_s_) + measured.delay_s();
-  const auto passive_scale = [lag_s](double b, double k, double d) {
-    const double required = lag_s * k + d;
+  const auto passive_scale = [lag_s](double b, double k, double d, double velocity_gain) {
+    const double required = lag_s * k + velocity_gain * d;
     return is_finite(b) && required > b ? b / required : 1.0;
   };
-  return std::min(
-      passive_scale(damping_.linear_N_s_per_m, gains.stiffness_N_per_m, gains.damping_N_s_per_m),
-      passive_scale(damping_.angular_Nm_s_per_rad, gains.stiffness_Nm_per_rad, gains.damping_Nm_s_per_rad));
+  return std::min(passive_scale(damping_.linear_N_s_per_m, gains.stiffness_N_per_m, gains.damping_N_s_per_m,
+                                linear_velocity_gain_),
+                  passive_scale(damping_.angular_Nm_s_per_rad, gains.stiffness_Nm_per_rad,
+                                gains.damping_Nm_s_per_rad, angular_velocity_gain_));
 }
 
 PassivityGuard StabilityAnalysis::make_passivity_guard(const LoopMeasurement& measured) const noexcept {

@@ -33,7 +33,8 @@ class StabilityAnalysis {
                                   double workspace_scale = 1.0) const noexcept;
 
   /// Returns the largest passive scale of isotropic springs and dampers about the handle, METHOD (83), 0
-  /// to 1. Returns 1 if the profile states no damping. RT-safe.
+  /// to 1. A damper on an estimated velocity counts by its energy gain. Returns 1 if the profile states no
+  /// damping. RT-safe.
   double max_stable_scale_at_handle(const LoopMeasurement& measured,
                                     const LocalModels::TotalGains& gains) const noexcept;
 
@@ -51,6 +52,8 @@ class StabilityAnalysis {
   double period_s_;
   double max_linear_N_per_m_;      ///< Maximum linear stiffness of the profile; NaN if not stated.
   double max_angular_Nm_per_rad_;  ///< Maximum angular stiffness of the profile; NaN if not stated.
+  double linear_velocity_gain_;    ///< Energy gain of the linear velocity: 1, or kEstimateGain.
+  double angular_velocity_gain_;   ///< Energy gain of the angular velocity: 1, or kEstimateGain.
 };
 
 }  // namespace wrenchd

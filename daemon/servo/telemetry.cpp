@@ -35,6 +35,7 @@ void record_sample(const DeviceReading& reading, TickRecord& record) noexcept {
   record.sample_fault = sample.fault;
   record.X_BH = numbers_of(sample.X_BH);
   record.V_BH = numbers(sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s);
+  record.estimated_velocity_dofs = sample.estimated_velocity_dofs;
 }
 
 void record_contact(const ContactState& contact, TickRecord& record) noexcept {

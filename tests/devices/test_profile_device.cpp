@@ -34,14 +34,20 @@ class ScriptedLink final : public ReportLink {
     return {LinkStatus::ok, bytes.size(), arrived};
   }
   LinkStatus write(TimePoint, std::span<const std::uint8_t> report) noexcept override {
-    if (write_status == LinkStatus::ok) written.push_back(decode(kProfile.wrench_report, report));
+    if (write_status == LinkStatus::ok) {
+      written.push_back(decode(kProfile.wrench_report, report));
+      written_bytes.emplace_back(report.begin(), report.end());
+    }
     return write_status;
   }
   void wait_readable(TimePoint) noexcept override {}
   void close() noexcept override { ++closed; }
+  bool declares(std::span<const std::uint8_t>) const noexcept override { return declares_all; }
 
   std::deque<std::pair<std::vector<std::uint8_t>, TimePoint>> reports;
   std::vector<Decoded<WrenchReport>> written;
+  std::vector<std::vector<std::uint8_t>> written_bytes;
+  bool declares_all = false;
   LinkStatus write_status = LinkStatus::ok;
   bool gone = false;
   int opened = 0, closed = 0;
@@ -57,6 +63,7 @@ struct Bench {
   Bench() {
     device.open();
     device.read_newest(now);  // the first read only discards waiting reports
+    device.assume_trusted();
   }
 
   /// Advances one millisecond and sends a report at its end.
@@ -536,6 +543,8 @@ TEST_CASE("a device with keep-alive gets it at its period, and its shutdown repo
   ProfileDevice device(profile, link);
   device.open();
   TimePoint now{};
+  device.read_newest(now);
+  device.assume_trusted();
   for (int i = 0; i <= 2000; ++i) device.read_newest(now += 1ms);
   CHECK(link.written.size() == 4);
   for (const auto& written : link.written) CHECK(written.outcome == Decoding::wrong_length);
@@ -555,6 +564,7 @@ TEST_CASE("a device without torque drops it, and a device without a watchdog get
   device.open();
   TimePoint now{};
   device.read_newest(now);
+  device.assume_trusted();
   CHECK(device.write(now, {{20, 0, 0}, {0, 0.1, 0}}, true) == Fault::none);
   const DeviceSample sample = device.read_newest(now);
   CHECK(dof_text(sample.driven_dofs) == "x y z");
@@ -566,6 +576,7 @@ TEST_CASE("a device without torque drops it, and a device without a watchdog get
   ProfileDevice unwatched(profile, other);
   unwatched.open();
   unwatched.read_newest(now);
+  unwatched.assume_trusted();
   unwatched.write(now, {{20, 0, 0}, {0, 9, 0}}, true);
   CHECK(other.written.back().report.F.force_N.x() == Approx(2.5).epsilon(1e-6));
   CHECK(other.written.back().report.F.torque_Nm.y() == Approx(0.125).epsilon(1e-4));
@@ -582,6 +593,7 @@ TEST_CASE("the frames of the device convert to base and handle in both direction
   device.open();
   TimePoint now{};
   device.read_newest(now);
+  device.assume_trusted();
   PoseReport report;
   report.sequence = 1;
   report.X_BH.translation_m = {0.01, 0.02, 0.03};
@@ -607,4 +619,89 @@ TEST_CASE("the frames of the device convert to base and handle in both direction
   const Vector3d about_E =
       R.transpose() * F.torque_Nm + Vector3d(0, -0.1, 0).cross(R.transpose() * F.force_N);
   CHECK((sent.torque_Nm - about_E).norm() < 1e-5);
+}
+
+TEST_CASE("nothing is written before the reports have been those of the profile", "[trust]") {
+  ScriptedLink link;
+  DeviceProfile profile = kProfile;
+  profile.shutdown.bytes = {4, 0};
+  profile.keep_alive.bytes = {5, 1};
+  profile.keep_alive_period_s = 0.001;
+  ProfileDevice device(profile, link);
+  TimePoint now{};
+  device.open();
+  device.read_newest(now);
+  PoseReport report;
+  const auto step = [&](bool valid) {
+    now += 1ms;
+    ++report.sequence;
+    report.device_time += 1000;
+    std::vector<std::uint8_t> bytes(profile.pose_report.length);
+    encode(profile.pose_report, report, bytes);
+    if (!valid) bytes[10] ^= 1;
+    link.reports.emplace_back(bytes, now);
+    device.read_newest(now);
+    return device.write(now, {{0, 0, 1.0}, {}}, true);
+  };
+  SECTION("another device: reports that are not those of the profile") {
+    for (int i = 0; i < 500; ++i) {
+      CHECK(step(false) == Fault::none);
+      if (i % 50 == 0) device.release(now);
+    }
+    CHECK_FALSE(device.trusted());
+    CHECK(link.written_bytes.empty());
+  }
+  SECTION("one valid report is not enough, and an invalid one starts the count again") {
+    for (int i = 0; i < 20; ++i) step(i % ProfileDevice::kTrustReports != 0);
+    CHECK(link.written_bytes.empty());
+    CHECK(device.commands_sent() == 0);
+  }
+  SECTION("the device of the profile") {
+    for (int i = 0; i < ProfileDevice::kTrustReports - 1; ++i) step(true);
+    CHECK(link.written_bytes.empty());
+    step(true);
+    CHECK(device.trusted());
+    REQUIRE_FALSE(link.written.empty());
+    CHECK(link.written.back().report.F.force_N.z() == Approx(1.0));
+    step(false);  // a bad report later changes nothing
+    CHECK(device.trusted());
+    device.close();
+    device.open();  // it may be another device now
+    CHECK_FALSE(device.trusted());
+  }
+}
+
+TEST_CASE("a lock-step device gets zeros with the motors off before it is trusted", "[trust]") {
+  ScriptedLink link;
+  DeviceProfile profile = kProfile;
+  profile.stream = StreamStyle::lock_step;
+  ProfileDevice device(profile, link);
+  TimePoint now{};
+  device.open();
+  for (int i = 0; i < 100; ++i) {
+    device.read_newest(now += 1ms);
+    device.write(now, {{0, 0, 1.0}, {0.01, 0, 0}}, true);
+  }
+  REQUIRE_FALSE(link.written.empty());
+  for (const auto& command : link.written) {
+    CHECK_FALSE(command.report.enable);
+    CHECK(command.report.F.force_N.norm() == 0.0);
+    CHECK(command.report.F.torque_Nm.norm() == 0.0);
+  }
+}
+
+TEST_CASE("a report that the device declares and the profile does not need is no error", "[spacemouse]") {
+  Bench bench;
+  for (int i = 0; i < 10; ++i) bench.step();
+  const std::vector<std::uint8_t> keys = {0x1c, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  bench.link.reports.emplace_back(keys, bench.now);
+  CHECK(bench.step().rejected == 1);
+  bench.link.declares_all = true;
+  bench.link.reports.emplace_back(keys, bench.now);
+  const DeviceSample sample = bench.step();
+  CHECK(sample.rejected == 0);
+  CHECK(sample.fresh);
+  bench.link.reports.emplace_back(std::vector<std::uint8_t>{1, 2, 3},
+                                  bench.now);  // a report of the profile, damaged
+  CHECK(bench.step().rejected == 1);
 }

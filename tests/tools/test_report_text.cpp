@@ -50,6 +50,19 @@ TEST_CASE("SpaceMouse reports are decoded in both formats", "[report_text]") {
              Contains("battery_percent      87") && Contains("charging             yes"));
 }
 
+// 118 of 350 counts, with a dead zone of 8 % and a quadratic response.
+TEST_CASE("the tool velocity of a puck has the dead zone and the response of the daemon", "[report_text]") {
+  CHECK_THAT(decoded("spacemouse_split", "01 76 00 00 00 00 00"), Contains("tool velocity        0 -0.0077"));
+  CHECK_THAT(decoded("spacemouse_split", "01 14 00 00 00 00 00"), Contains("tool velocity        0 0 0 m/s"));
+  CHECK_THAT(decoded("spacemouse_split", "02 5e 01 00 00 00 00"), Contains("tool angular vel.    0 -0.997"));
+}
+
+TEST_CASE("the keys of a SpaceMouse Enterprise are decoded", "[report_text]") {
+  const std::string keys = decoded("spacemouse_combined", "1c 0d 00 02 00 00 00 00 00 00 00 00 00");
+  CHECK_THAT(keys,
+             Contains("(keys)") && Contains("key_1                13") && Contains("key_2                2"));
+}
+
 TEST_CASE("Polhem reports are decoded, with the button inside an encoder count", "[report_text]") {
   const std::string bytes = "00 00 00 00 78 ec 0a 27 00 00 00 00 01 00";
   const std::string text = decoded("polhem", bytes);
