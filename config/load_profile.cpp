@@ -224,6 +224,18 @@ void read_usb_ids(const TomlValue& list, std::vector<UsbId>& ids) {
   }
 }
 
+/// Parses "256f": four hexadecimal digits.
+void read_usb_vendors(const TomlValue& list, std::vector<std::uint16_t>& vendors) {
+  for (const TomlValue& element : list.elements("an array of vendor ids, as in [\"256f\"]")) {
+    std::string text;
+    if (!element.text(text)) continue;
+    if (const auto id = usb_id(text + ":0000"))
+      vendors.push_back(id->vendor);
+    else
+      element.reject_found("a vendor as four hexadecimal digits, as in \"256f\"");
+  }
+}
+
 void read_id16(const TomlValue& value, std::optional<std::uint16_t>& out) {
   std::uint16_t number = 0;
   if (value.integer(number, {0, 65535})) out = number;
@@ -234,10 +246,12 @@ void read_match(TomlTable& table, DeviceMatch& match) {
   const TomlValue by_layout = table.optional("usb_by_layout");
   read_usb_ids(usb, match.usb);
   read_usb_ids(by_layout, match.usb_by_layout);
+  read_usb_vendors(table.optional("usb_vendors_by_layout"), match.usb_vendors_by_layout);
   if (!usb && !by_layout) usb.reject("is missing; name at least one device, as in usb = [\"046d:c626\"]");
   if (usb.is_array() && match.usb.empty() && !by_layout && usb.elements("").empty())
     usb.reject("is empty; name at least one device, as in usb = [\"046d:c626\"]");
   table.optional("serial").text(match.serial);
+  table.optional("product").text(match.product);
   table.optional("only_when_named").boolean(match.only_when_named);
   const TomlValue page = table.optional("usage_page");
   read_id16(page, match.usage_page);

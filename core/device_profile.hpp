@@ -247,7 +247,10 @@ struct DeviceMatch {
   std::vector<UsbId> usb;
   /// ids that match only if the device's report descriptor contains the reports of this profile
   std::vector<UsbId> usb_by_layout;
-  std::string serial;  ///< required serial number; empty: any
+  /// vendor ids whose devices match only if their report descriptor contains the reports of this profile
+  std::vector<std::uint16_t> usb_vendors_by_layout;
+  std::string serial;   ///< required serial number; empty: any
+  std::string product;  ///< required product string; empty: any
   /// the ids are shared with another profile; this profile applies only if the configuration names it
   bool only_when_named = false;
   std::optional<std::uint16_t> usage_page;

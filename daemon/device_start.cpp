@@ -73,7 +73,8 @@ bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWa
       [&] {
         const std::vector<UsbDevice> plugged = list_usb_devices();
         const DeviceChoice choice =
-            choose_device(plugged, known.profiles, {{}, config.settings.device.serial, {}});
+            choose_device(plugged, known.profiles,
+                          {{}, config.settings.device.serial, config.settings.device.usb_port, {}});
         if (choice.selection) {
           config.profile = known.profiles[choice.selection->profile];
           config.settings.device.profile_file = known.files[choice.selection->profile];

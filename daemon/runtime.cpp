@@ -68,8 +68,9 @@ LinkSettings link_settings(const RunConfig& config) {
 }
 
 std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config) {
-  return std::make_unique<ReconnectingLink>(config.profile, config.settings.device.serial,
-                                            link_settings(config));
+  const DeviceSettings& device = config.settings.device;
+  return std::make_unique<ReconnectingLink>(config.profile, device.serial, link_settings(config),
+                                            device.usb_port);
 }
 
 Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,

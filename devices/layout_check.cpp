@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 namespace wrenchd {
 namespace {
@@ -90,6 +92,18 @@ bool acceptably_short(const DescribedReport& device, const ExpectedReport& expec
          device.length < expected_report.length;
 }
 
+/// Returns how the logical range of the device differs from the full deflection of the profile.
+std::optional<std::string> range_difference(const DescribedField& device, const ExpectedField& field) {
+  const auto largest =
+      static_cast<double>(std::max(std::abs(device.logical_min), std::abs(device.logical_max)));
+  if (!(field.full_counts > 0.0) || largest == 0.0) return {};
+  if (largest <= kMaxRangeRatio * field.full_counts && field.full_counts <= kMaxRangeRatio * largest)
+    return {};
+  return "full deflection is " + std::to_string(std::lround(field.full_counts)) +
+         " counts in the profile; the device counts from " + std::to_string(device.logical_min) + " to " +
+         std::to_string(device.logical_max) + ": use a profile with another step";
+}
+
 /// Returns the difference of one field, only once even if several of its integers differ.
 std::optional<std::string> difference(const DescribedReport& device, const ExpectedField& field,
                                       bool may_be_short) {
@@ -106,6 +120,7 @@ std::optional<std::string> difference(const DescribedReport& device, const Expec
     const std::vector<Cell> cells = cells_within(device, begin, end);
     if (cells.empty()) return report_name + "the device declares nothing there";
     if (!agrees(cells, begin, end, field.is_signed)) return report_name + "the device has " + text(cells);
+    if (const auto range = range_difference(*cells.front().field, field)) return field.name + ": " + *range;
   }
   return {};
 }

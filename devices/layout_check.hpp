@@ -16,7 +16,13 @@ struct ExpectedField {
   unsigned bits = 0;  ///< width of one integer
   std::size_t count = 1;
   bool is_signed = false;
+  /// Counts at the full deflection of a puck; 0: unknown. A device whose logical range differs by more than
+  /// kMaxRangeRatio does not agree.
+  double full_counts = 0.0;
 };
+
+/// Real devices of one family differ in their range by less.
+inline constexpr double kMaxRangeRatio = 3.0;
 
 /// A report that is expected from a device, independent of the format of the expectation.
 struct ExpectedReport {
@@ -38,7 +44,8 @@ struct ExpectedReport {
 ///
 /// Vendor layouts often describe only bytes: fields of 8 bits on a vendor page. Such bytes agree with every
 /// field that lies within them. Elsewhere an expected field must match a device field with its sign, or be a
-/// mask of single bits, such as buttons. Padding is not data. Not RT-safe: allocates.
+/// mask of single bits, such as buttons. Padding is not data. If the full deflection is known in counts, the
+/// logical range of the device must be similar. Not RT-safe: allocates.
 std::vector<std::string> find_differences(const ReportDescriptor& device,
                                           const std::vector<ExpectedReport>& expected);
 

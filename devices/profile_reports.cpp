@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/profile_reports.hpp"
 
+#include <cmath>
+
 #include "devices/discovery/match_profile.hpp"
 
 namespace wrenchd {
@@ -26,6 +28,12 @@ class FieldCollector {
     const unsigned bits_each = field.coding == Coding::nibble_ascii ? 2 * field.bits : field.bits;
     add(name, 8 * field.byte + field.bit, bits_each, field.count, field.is_signed);
   }
+  /// full: value of the field at the full deflection of a puck; NaN if it is not stated.
+  void deflection(const std::string& name, const ReportField& deflected, double full) {
+    field(name, deflected);
+    const double counts = full / std::abs(deflected.step);
+    if (deflected.present && counts > 0.0) report_.fields.back().full_counts = counts;
+  }
   void bit(const std::string& name, const ReportBit& bit) {
     if (bit.present) add(name, 8 * bit.byte + bit.bit, 1, 1, false);
   }
@@ -37,13 +45,13 @@ class FieldCollector {
 
  private:
   void add(const std::string& name, std::size_t bit, unsigned bits, std::size_t count, bool is_signed) {
-    report_.fields.push_back({name, bit, bits, count, is_signed});
+    report_.fields.push_back({name, bit, bits, count, is_signed, 0.0});
   }
 
   ExpectedReport report_;
 };
 
-ExpectedReport expected_report(const PoseReportLayout& p) {
+ExpectedReport expected_report(const PoseReportLayout& p, const Deflection& full) {
   FieldCollector pose(ReportKind::input, p);
   pose.bit("motors_on", p.motors_on);
   pose.bit("watchdog_tripped", p.watchdog_tripped);
@@ -53,8 +61,8 @@ ExpectedReport expected_report(const PoseReportLayout& p) {
   pose.field("orientation", p.orientation);
   pose.field("linear_velocity", p.linear_velocity);
   pose.field("angular_velocity", p.angular_velocity);
-  pose.field("translation", p.translation);
-  pose.field("rotation", p.rotation);
+  pose.deflection("translation", p.translation, full.full_deflection_m);
+  pose.deflection("rotation", p.rotation, full.full_deflection_rad);
   pose.field("joints", p.joints);
   pose.field("buttons", p.buttons);
   pose.bits("buttons", p.button_bits);
@@ -79,9 +87,10 @@ ExpectedReport expected_report(const WrenchReportLayout& w) {
 }  // namespace
 
 std::vector<ExpectedReport> expected_reports(const DeviceProfile& profile) {
-  std::vector<ExpectedReport> reports = {expected_report(profile.pose_report)};
+  const Deflection full = profile.deflection.value_or(Deflection{});
+  std::vector<ExpectedReport> reports = {expected_report(profile.pose_report, full)};
   for (const PoseReportLayout& more : profile.more_reports) {
-    reports.push_back(expected_report(more));
+    reports.push_back(expected_report(more, full));
     reports.back().may_be_absent = !carries_pose(more);
   }
   if (profile.has_output) reports.push_back(expected_report(profile.wrench_report));

@@ -21,7 +21,8 @@ struct Entry {
   UsbDevice printable;  ///< the device with printable strings
   InspectedDevice facts;
   MatchResult match;
-  bool related = false;  ///< the interface belongs to a supported or related device
+  bool related = false;           ///< the interface belongs to a supported or related device
+  bool matches_if_named = false;  ///< a profile matches if the configuration names it
 };
 
 /// The interfaces of one device.
@@ -45,12 +46,17 @@ bool claims(const DeviceProfile& profile, UsbId id) {
   const auto holds = [id](const std::vector<UsbId>& ids) {
     return std::find(ids.begin(), ids.end(), id) != ids.end();
   };
-  return holds(profile.match.usb) || holds(profile.match.usb_by_layout);
+  const auto& vendors = profile.match.usb_vendors_by_layout;
+  return holds(profile.match.usb) || holds(profile.match.usb_by_layout) ||
+         std::find(vendors.begin(), vendors.end(), id.vendor) != vendors.end();
 }
 
 Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profiles) {
-  Entry entry{to_printable(device), inspect_device(device), {}, false};
+  Entry entry{to_printable(device), inspect_device(device), {}, false, false};
   entry.match = match_profile(entry.facts.identity, profiles);
+  entry.matches_if_named = std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
+    return match_profile(entry.facts.identity, std::span(&profile, 1), profile.name).profile.has_value();
+  });
   const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
   entry.related = entry.match.profile || !entry.match.rejection.empty() || multi_axis ||
                   std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
@@ -75,13 +81,17 @@ std::vector<Interfaces> by_device(const std::vector<Entry>& entries) {
   return devices;
 }
 
-/// Returns the interfaces that the list describes: those with a profile, otherwise the first related one. The
-/// others have the same id and would repeat its text.
+/// Returns the interfaces that the list describes: those with a profile, otherwise the first one that a
+/// profile would match if the configuration named it, otherwise the first related one. The others have the
+/// same id and would repeat its text.
 std::vector<const Entry*> described_interfaces(Interfaces device, bool all) {
   std::vector<const Entry*> found;
   for (const Entry& entry : device)
     if (all || entry.match.profile) found.push_back(&entry);
   if (!found.empty()) return found;
+  const auto nameable =
+      std::find_if(device.begin(), device.end(), [](const Entry& entry) { return entry.matches_if_named; });
+  if (nameable != device.end()) return {&*nameable};
   const auto with_usage = std::find_if(device.begin(), device.end(), [](const Entry& entry) {
     return entry.related && Usage{entry.printable.usage_page, entry.printable.usage} == kMultiAxis;
   });
@@ -243,7 +253,9 @@ std::string equal_devices(const std::vector<Entry>& entries, const std::vector<D
     const std::set<std::string> different(serials.begin(), serials.end());
     text += std::to_string(serials.size()) + " devices have the profile " + profiles[i].name;
     if (different.size() < serials.size() || different.count("") != 0) {
-      text += ", and no serial numbers to distinguish them: connect only the intended device\n";
+      text +=
+          ", and no serial numbers to distinguish them: set usb_port in [device] of wrenchd.toml, or "
+          "connect only the intended device\n";
       continue;
     }
     text += ": to select one of them, write a profile with inherits = \"" + profiles[i].name +

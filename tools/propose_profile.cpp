@@ -10,6 +10,8 @@
 
 #include "config/config_error.hpp"
 #include "config/toml_file.hpp"
+#include "devices/layout_check.hpp"
+#include "devices/profile_reports.hpp"
 #include "devices/six_axes.hpp"
 
 namespace wrenchd {
@@ -426,16 +428,52 @@ std::string makers_own(const DescriptorSource& source, const ReportDescriptor& d
          wrench_table(descriptor);
 }
 
+/// The first lines: profiles that need no new file.
+std::string already_fitting(const DescriptorSource& source, const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names)
+    text += "# The profile " + name + " already fits this device" +
+            (source.id ? "" : ", if its ids match or you name it") + ": set profile = \"" + name +
+            "\" in [device] of wrenchd.toml.\n";
+  return text.empty() ? text
+                      : text + "# You need the proposal below only for a device with other properties.\n#\n";
+}
+
+bool claims(const DeviceProfile& profile, UsbId id) {
+  const DeviceMatch& match = profile.match;
+  const auto has = [](const auto& list, const auto& x) {
+    return std::find(list.begin(), list.end(), x) != list.end();
+  };
+  return has(match.usb, id) || has(match.usb_by_layout, id) || has(match.usb_vendors_by_layout, id.vendor);
+}
+
 }  // namespace
 
-std::string propose_profile(const DescriptorSource& source) {
+std::vector<std::string> fitting_profiles(const DescriptorSource& source,
+                                          const std::vector<DeviceProfile>& profiles) {
+  const ReportDescriptor descriptor = parse_descriptor(source);
+  const Usage usage = descriptor.collections.empty() ? Usage{} : descriptor.collections.front().usage;
+  std::vector<std::string> names;
+  for (const DeviceProfile& profile : profiles) {
+    const DeviceMatch& match = profile.match;
+    if (profile.transport == Transport::loopback || (source.id && !claims(profile, *source.id))) continue;
+    if (match.usage_page && *match.usage_page != usage.page) continue;
+    if (match.usage && *match.usage != usage.id) continue;
+    if (find_differences(descriptor, expected_reports(profile)).empty()) names.push_back(profile.name);
+  }
+  return names;
+}
+
+std::string propose_profile(const DescriptorSource& source, const std::vector<std::string>& fitting) {
   const ReportDescriptor descriptor = parse_descriptor(source);
   const SixAxisResult axes = find_six_axes(descriptor);
-  if (axes.controller) return head(source, descriptor) + multi_axis(source, *axes.controller, descriptor);
+  const std::string first = already_fitting(source, fitting);
+  if (axes.controller)
+    return first + head(source, descriptor) + multi_axis(source, *axes.controller, descriptor);
   if (std::none_of(descriptor.reports.begin(), descriptor.reports.end(), of_maker))
     throw std::runtime_error(source.file + ": nothing to propose: " + axes.rejection +
                              ", and no report is vendor-defined; name another device");
-  return head(source, descriptor) + makers_own(source, descriptor);
+  return first + head(source, descriptor) + makers_own(source, descriptor);
 }
 
 }  // namespace wrenchd

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tools/descriptor_source.hpp"
 
@@ -15,6 +16,13 @@ namespace wrenchd {
 ///
 /// Throws std::runtime_error if the descriptor is invalid, or if the device is neither a multi-axis
 /// controller nor a device with vendor-defined reports. Not RT-safe: allocates.
-std::string propose_profile(const DescriptorSource& source);
+///
+/// fitting: names of profiles that already fit the device; if there are any, the text begins with them.
+std::string propose_profile(const DescriptorSource& source, const std::vector<std::string>& fitting = {});
+
+/// Returns the names of all profiles that fit a device: its report descriptor agrees with the profile, and so
+/// do its ids if they are known. Not RT-safe: allocates.
+std::vector<std::string> fitting_profiles(const DescriptorSource& source,
+                                          const std::vector<DeviceProfile>& profiles);
 
 }  // namespace wrenchd

@@ -72,14 +72,26 @@ SUBSYSTEM=="input", ATTRS{idVendor}==")" +
   return text + "\n";
 }
 
+/// Access to the other devices of a vendor. Most of them are no devices for wrenchd, so the desktop keeps
+/// them and they do not start the service.
+std::string vendor_block(std::uint16_t vendor, const std::string& names) {
+  return "\n# other devices of " + hex4(vendor, "%04x") + ", by report descriptor:" + names +
+         "\nSUBSYSTEM==\"hidraw\", KERNELS==\"*:" + hex4(vendor, "%04X") +
+         ":*\", GROUP=\"wrenchd\", MODE=\"0660\"\n";
+}
+
 }  // namespace
 
 std::string udev_rules(std::span<const DeviceProfile> profiles) {
   WantedById wanted;
+  std::map<std::uint16_t, std::string> vendors;  ///< names of the profiles that match by vendor and layout
   for (const DeviceProfile& profile : profiles) {
     if (profile.transport == Transport::loopback) continue;
     for (const auto* ids : {&profile.match.usb, &profile.match.usb_by_layout})
       for (const UsbId id : *ids) want(wanted, profile, id);
+    if (profile.transport == Transport::hidraw)
+      for (const std::uint16_t vendor : profile.match.usb_vendors_by_layout)
+        vendors[vendor] += " " + profile.name;
   }
   std::string text =
       std::string("# wrenchd ") + kVersion +
@@ -91,6 +103,7 @@ std::string udev_rules(std::span<const DeviceProfile> profiles) {
 ACTION=="remove", GOTO="wrenchd_end"
 )";
   for (const auto& [id, w] : wanted) text += block(id.first, id.second, w);
+  for (const auto& [vendor, names] : vendors) text += vendor_block(vendor, names);
   return text + "\nLABEL=\"wrenchd_end\"\n";
 }
 

@@ -21,6 +21,9 @@ std::string serial_text(const UsbDevice& device) {
 std::string rejection_by_criteria(const UsbDevice& device, const DeviceCriteria& criteria) {
   if (!criteria.serial.empty() && device.serial != criteria.serial)
     return "the configuration requires serial number " + criteria.serial + ", it has " + serial_text(device);
+  if (!criteria.usb_port.empty() && device.port_path != criteria.usb_port)
+    return "the configuration requires the USB port " + criteria.usb_port + ", it is in " +
+           (device.port_path.empty() ? "none" : device.port_path);
   if (criteria.previous && !device.is_same_device(*criteria.previous))
     return "it is not the device that was unplugged, " + describe(*criteria.previous) +
            "; connect that device again, or restart wrenchd to use this one (wrong_device)";
@@ -42,7 +45,8 @@ std::string rejection_by_descriptor(const InspectedDevice& inspected, const Devi
 Candidate evaluate(const UsbDevice& device, std::span<const DeviceProfile> profiles,
                    const DeviceCriteria& criteria) {
   const InspectedDevice inspected = inspect_device(device);
-  const MatchResult match = match_profile(inspected.identity, profiles, criteria.profile);
+  const bool serial_named = !criteria.serial.empty() && criteria.serial == device.serial;
+  const MatchResult match = match_profile(inspected.identity, profiles, criteria.profile, serial_named);
   if (!match.rejection.empty()) return {{}, match.rejection};
   if (!match.profile) {
     for (std::size_t i = 0; i < profiles.size() && !criteria.profile.empty(); ++i)
@@ -73,7 +77,8 @@ DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const
     choice.rejections[pick.device] =
         "it matches the profile " + profiles[pick.profile].name + ", and other devices match too: this is " +
         serial_text(connected[pick.device]) +
-        "; set the profile and the serial number in [device], or unplug the others";
+        (connected[pick.device].port_path.empty() ? "" : " in USB port " + connected[pick.device].port_path) +
+        "; set the profile and the serial number or usb_port in [device], or unplug the others";
   return choice;
 }
 

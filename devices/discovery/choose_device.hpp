@@ -16,6 +16,8 @@ namespace wrenchd {
 struct DeviceCriteria {
   std::string profile = {};  ///< name of the profile; empty: any profile for a real device
   std::string serial = {};   ///< serial number of the device; empty: any
+  /// USB port of the device, as UsbDevice::port_path; empty: any. For equal devices without serial numbers.
+  std::string usb_port = {};
   /// The device that was driven and then unplugged: only this device is selected again.
   std::optional<UsbDevice> previous = {};
 };
@@ -33,7 +35,7 @@ struct DeviceChoice {
 };
 
 /// Selects the one device that meets the criteria. The device must match one of the profiles
-/// (match_profile()), have the requested serial number and interface, and have a report descriptor that
+/// (match_profile()), have the requested serial number, port and interface, and have a report descriptor that
 /// agrees with the profile. If several devices qualify, selects none, and each rejection states how to
 /// distinguish the device. Opens no device. Not RT-safe: allocates.
 DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const DeviceProfile> profiles,

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdio>
 
+#include "devices/discovery/shared_usb_ids.hpp"
 #include "devices/discovery/unusable_devices.hpp"
 
 namespace wrenchd {
@@ -16,7 +17,8 @@ std::string hex(unsigned number) {
   return text.data();
 }
 
-bool contains(const std::vector<UsbId>& ids, UsbId id) {
+template <class Id>
+bool contains(const std::vector<Id>& ids, Id id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
 
@@ -48,17 +50,38 @@ std::string rejection_by_usage(const char* name, std::optional<std::uint16_t> wa
          hex(*wanted);
 }
 
-std::string rejection(const DeviceIdentity& device, const DeviceProfile& profile, std::string_view named) {
+/// Returns why the device is not identified well enough to write to it; empty if it is.
+std::string rejection_by_trust(const DeviceIdentity& device, const DeviceProfile& profile) {
+  const DeviceMatch& match = profile.match;
+  if (!profile.has_output || !match.serial.empty() || !match.product.empty()) return {};
+  const bool lock_step = profile.stream == StreamStyle::lock_step;
+  if (!lock_step && profile.pose_report.checksum != Checksum::none) return {};
+  const std::string cure = ": set profile = \"" + profile.name +
+                           "\" in [device] of wrenchd.toml, or write a profile that inherits it and states "
+                           "serial or product in [match]";
+  if (const SharedUsbIds* shared = find_shared_usb_id(device.id))
+    return text(device.id) + " is the id of " + std::string(shared->users) +
+           ", so wrenchd writes nothing to it unless it is named" + cure;
+  if (lock_step) return "it sends nothing before wrenchd writes to it, so it must be named" + cure;
+  return {};
+}
+
+std::string rejection(const DeviceIdentity& device, const DeviceProfile& profile, std::string_view named,
+                      bool serial_named) {
   const DeviceMatch& match = profile.match;
   if (!named.empty() && profile.name != named)
     return "the configuration selects the profile " + std::string(named);
   if (named.empty() && match.only_when_named) return "it is used only if the configuration names it";
   if (profile.transport == Transport::loopback) return "it is for the simulated device";
-  const bool by_layout = contains(match.usb_by_layout, device.id);
+  const bool by_layout =
+      contains(match.usb_by_layout, device.id) || contains(match.usb_vendors_by_layout, device.id.vendor);
   if (!contains(match.usb, device.id) && !by_layout) return "its ids do not include " + text(device.id);
   if (!match.serial.empty() && match.serial != device.serial)
     return "it is for serial number " + match.serial + ", not " +
            (device.serial.empty() ? "a device without one" : device.serial);
+  if (!match.product.empty() && match.product != device.product)
+    return "it is for the product \"" + match.product + "\", not " +
+           (device.product.empty() ? "a device without a product string" : "\"" + device.product + "\"");
   if (profile.transport == Transport::libusb && device.interface &&
       *device.interface != profile.endpoints.interface)
     return "it uses interface " + std::to_string(profile.endpoints.interface) + " of the device, this is " +
@@ -66,13 +89,21 @@ std::string rejection(const DeviceIdentity& device, const DeviceProfile& profile
   std::string why = rejection_by_usage("the usage page", match.usage_page, device.usage_page);
   if (why.empty()) why = rejection_by_usage("the usage", match.usage, device.usage);
   if (!why.empty()) return why;
-  if (!device.input_reports.empty()) return rejection_by_reports(profile, device.input_reports);
-  return by_layout ? "devices with this id differ, and the report descriptor has not been read" : "";
+  if (!device.input_reports.empty())
+    why = rejection_by_reports(profile, device.input_reports);
+  else if (by_layout && !contains(match.usb, device.id))
+    why = "devices with this id differ, and the report descriptor has not been read";
+  if (!why.empty() || !named.empty() || serial_named) return why;
+  return rejection_by_trust(device, profile);
 }
 
-/// Priority of a matching profile: a named serial number before a named id.
+/// Priority of a matching profile: a serial number before a product string before an id before a vendor.
 int rank(const DeviceIdentity& device, const DeviceProfile& profile) {
-  return (profile.match.serial.empty() ? 0 : 2) + (contains(profile.match.usb, device.id) ? 1 : 0);
+  const DeviceMatch& match = profile.match;
+  return (match.serial.empty() ? 0 : 8) + (match.product.empty() ? 0 : 4) +
+         (contains(match.usb, device.id)             ? 2
+          : contains(match.usb_by_layout, device.id) ? 1
+                                                     : 0);
 }
 
 }  // namespace
@@ -87,7 +118,7 @@ std::string text(UsbId id) {
 }
 
 MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
-                          std::string_view named) {
+                          std::string_view named, bool serial_named) {
   MatchResult result;
   if (const UnusableDevice* unusable = find_unusable_device(device.id)) {
     result.rejection =
@@ -97,7 +128,7 @@ MatchResult match_profile(const DeviceIdentity& device, std::span<const DevicePr
   }
   int best = -1;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
-    result.rejections.push_back(rejection(device, profiles[i], named));
+    result.rejections.push_back(rejection(device, profiles[i], named, serial_named));
     if (!result.rejections.back().empty()) continue;
     const int priority = rank(device, profiles[i]);
     if (priority > best) {

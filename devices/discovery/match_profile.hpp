@@ -38,11 +38,19 @@ struct MatchResult {
 };
 
 /// Finds the profile of a device. If several match, a profile that names the serial number has priority, then
-/// one that names the id in `usb` over one in `usb_by_layout`. If two profiles have equal priority, no
-/// profile is used. If the configuration names a profile (`named`), only that profile is considered, even if
-/// it is marked only_when_named. Not RT-safe: allocates.
+/// one that names the product string, then one that names the id in `usb` over one in `usb_by_layout`, and
+/// the latter over one that names the vendor only. If two profiles have equal priority, no profile is used.
+/// If the configuration names a profile (`named`), only that profile is considered, even if it is marked
+/// only_when_named.
+///
+/// wrenchd may write to a device with motors only if it knows the device. Ids that many kinds of devices
+/// share (shared_usb_ids.hpp) do not identify it, and a lock-step device must be written to before it sends
+/// anything. Such a profile matches only if it names a serial number or a product string, or if the
+/// configuration names the profile or the serial number of this device (`serial_named`). Exception: a device
+/// that sends first and protects its reports by a checksum identifies itself, because wrenchd writes nothing
+/// before it has received such reports. Not RT-safe: allocates.
 MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
-                          std::string_view named = {});
+                          std::string_view named = {}, bool serial_named = false);
 
 /// Returns true if the report carries a part of the pose. A device without such a report does not match the
 /// profile. RT-safe.

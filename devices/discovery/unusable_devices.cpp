@@ -11,9 +11,6 @@ constexpr std::string_view kClosed =
     "protocol";
 constexpr std::string_view kNotSixAxes =
     "it is no six-axis device, although its vendor id is that of the SpaceMouse family; no action needed";
-constexpr std::string_view kUnclear =
-    "sources disagree on whether it has six axes; if yours has, send its report descriptor to the wrenchd "
-    "project";
 
 /// Sources of the ids, udev rules and drivers in public repositories: spacenavd (src/dev.c),
 /// jhu-saw/sawSensablePhantom, MXHsj/ros_geomagic_touch_hid, the rules of libdhd.
@@ -25,7 +22,6 @@ constexpr std::array kKnown = {
     UnusableDevice{0x16c0, 0x0483, 0x0483, "a Teensy serial device, such as Haply Inverse3", kClosed},
     UnusableDevice{0x2fe3, 0x0100, 0x0100, "Haply VerseGrip dongle", kClosed},
     UnusableDevice{0x256f, 0xc62c, 0xc62c, "a 3Dconnexion device without six axes", kNotSixAxes},
-    UnusableDevice{0x256f, 0xc641, 0xc641, "3Dconnexion c641", kUnclear},
     UnusableDevice{0x256f, 0xc650, 0xc651, "a 3Dconnexion device without six axes", kNotSixAxes},
     UnusableDevice{0x256f, 0xc654, 0xc658, "a 3Dconnexion device without six axes", kNotSixAxes},
     UnusableDevice{0x256f, 0xc664, 0xc665, "a 3Dconnexion device without six axes", kNotSixAxes},

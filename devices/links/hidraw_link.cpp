@@ -9,6 +9,8 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 
 #include <fcntl.h>
@@ -16,10 +18,20 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "devices/links/wake_up.hpp"
 
 namespace wrenchd {
+
+/// The kernel returns the number of bytes that it wrote, including the report id. A device that took less did
+/// not get the report.
+LinkStatus write_status(int written, std::size_t expected, int error) noexcept {
+  if (written >= 0 && static_cast<std::size_t>(written) == expected) return LinkStatus::ok;
+  const bool gone = written < 0 && (error == ENODEV || error == EIO);
+  return gone ? LinkStatus::disconnected : LinkStatus::not_ready;
+}
+
 namespace {
 
 /// The open and close functions of hidapi are not thread-safe: they share one error text.
@@ -72,7 +84,7 @@ void HidrawLink::CloseHid::operator()(hid_device_* device) const noexcept {
 }
 
 HidrawLink::HidrawLink(UsbDevice device, LinkSettings settings)
-    : device_(std::move(device)), settings_(std::move(settings)) {}
+    : device_(std::move(device)), settings_(std::move(settings)), declared_(device_.report_descriptor) {}
 
 void HidrawLink::open() {
   close();
@@ -171,8 +183,7 @@ LinkStatus HidrawLink::write_blocking(hid_device_* hid, bool numbered, std::span
   const std::size_t head = numbered ? 0 : 1;
   std::copy(report.begin(), report.end(), framed.begin() + static_cast<std::ptrdiff_t>(head));
   errno = 0;
-  if (hid_write(hid, framed.data(), head + report.size()) >= 0) return LinkStatus::ok;
-  return errno == ENODEV || errno == EIO ? LinkStatus::disconnected : LinkStatus::not_ready;
+  return write_status(hid_write(hid, framed.data(), head + report.size()), head + report.size(), errno);
 }
 
 void HidrawLink::wait_readable(TimePoint deadline) noexcept {
@@ -180,9 +191,27 @@ void HidrawLink::wait_readable(TimePoint deadline) noexcept {
 }
 
 void HidrawLink::close() noexcept {
+  const bool written = !writer_ || writer_->close();
   writer_.reset();
+  // While a write is stuck, the kernel keeps every other file of the node from being closed.
+  if (!written && reader_ && !disconnected_) close_later(std::move(reader_), fd_);
   reader_.reset();
   fd_ = -1;
+}
+
+/// Replacing the file waits for the kernel without hidapi's lock, which other devices of this process need.
+void HidrawLink::close_later(Hid hid, int fd) noexcept {
+  try {
+    std::thread([later = std::move(hid), fd]() mutable {
+      const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+      if (nothing >= 0) {
+        dup3(nothing, fd, O_CLOEXEC);
+        ::close(nothing);
+      }
+      later.reset();
+    }).detach();
+  } catch (const std::system_error&) {  // no thread: the destructor of `hid` waits for the kernel
+  }
 }
 
 }  // namespace wrenchd

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "core/clock.hpp"
+#include "devices/declared_reports.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "devices/links/latest_writer.hpp"
 #include "devices/links/link_settings.hpp"
@@ -17,6 +18,10 @@
 struct hid_device_;  // type of hidapi
 
 namespace wrenchd {
+
+/// Result of a write to a hidraw node that returned `written` and set `error`, for a report of `expected`
+/// bytes.
+LinkStatus write_status(int written, std::size_t expected, int error) noexcept;
 
 /// USB HID device through the kernel driver: hidapi, hidraw backend. The default transport.
 ///
@@ -46,8 +51,12 @@ class HidrawLink final : public ReportLink {
   /// failed; the report is then submitted nevertheless. RT-safe.
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
+  bool declares(std::span<const std::uint8_t> report) const noexcept override {
+    return declared_.contains(report);
+  }
   /// Writes the last submitted report and waits for it at most for the close_timeout of the settings. If a
-  /// write is stuck in the kernel, closing takes up to 5 s more. Not RT-safe: waits.
+  /// write is still stuck in the kernel then, a thread of its own closes the node when the kernel gives up
+  /// the write, after at most 5 s; until then the node is locked. Not RT-safe: waits.
   void close() noexcept override;
 
   const UsbDevice& device() const noexcept { return device_; }
@@ -64,6 +73,7 @@ class HidrawLink final : public ReportLink {
   using Hid = std::unique_ptr<hid_device_, CloseHid>;
 
   static LinkStatus write_blocking(hid_device_* hid, bool numbered, std::span<const std::uint8_t> report);
+  static void close_later(Hid hid, int fd) noexcept;
   LinkRead mark_disconnected(TimePoint now) noexcept;
 
   UsbDevice device_;
@@ -76,6 +86,7 @@ class HidrawLink final : public ReportLink {
   int taken_since_empty_ = 0;
   std::array<std::uint8_t, kMaxHidReportBytes> bytes_{};
   std::optional<LatestWriter> writer_;
+  DeclaredReports declared_;  ///< input reports in the descriptor of the device
 };
 
 }  // namespace wrenchd

@@ -8,9 +8,10 @@
 
 namespace wrenchd {
 
-ReconnectingLink::ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings)
+ReconnectingLink::ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings,
+                                   std::string usb_port)
     : profile_(std::move(profile)),
-      criteria_{profile_.name, std::move(serial), {}},
+      criteria_{profile_.name, std::move(serial), std::move(usb_port), {}},
       settings_(std::move(settings)) {}
 
 void ReconnectingLink::open() {
@@ -20,6 +21,7 @@ void ReconnectingLink::open() {
   if (!choice.selection)
     throw DeviceNotFound("no device of profile " + profile_.name +
                              (criteria_.serial.empty() ? "" : " with serial number " + criteria_.serial) +
+                             (criteria_.usb_port.empty() ? "" : " in USB port " + criteria_.usb_port) +
                              " is connected",
                          describe_rejected(connected, choice));
   const UsbDevice& device = connected[choice.selection->device];

@@ -26,13 +26,16 @@ class DeviceNotFound : public std::runtime_error {
 };
 
 /// Link to the connected device of a profile, over the transport that the profile names. Each open() searches
-/// for the device again, in any USB port. After the first open(), only the same device is accepted: same ids,
-/// serial number, interface and report descriptor. The link never writes to another device.
+/// for the device again, in any USB port unless one is required. After the first open(), only the same device
+/// is accepted: same ids, serial number, interface and report descriptor. The link never writes to another
+/// device.
 class ReconnectingLink final : public ReportLink {
  public:
-  /// serial: serial number; empty: any. The profile must be for a real device: not transport loopback.
-  /// settings: result of link_settings(), possibly with changes of the caller.
-  ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings);
+  /// serial: serial number; empty: any. usb_port: bus and ports; empty: any. The profile must be for a real
+  /// device: not transport loopback. settings: result of link_settings(), possibly with changes of the
+  /// caller.
+  ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings,
+                   std::string usb_port = {});
 
   /// Throws DeviceNotFound if the device is not connected, and std::runtime_error like HidrawLink and UsbLink
   /// if it cannot be opened. Not RT-safe: may take seconds.
@@ -41,6 +44,9 @@ class ReconnectingLink final : public ReportLink {
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
   void close() noexcept override;
+  bool declares(std::span<const std::uint8_t> report) const noexcept override {
+    return link_ && link_->declares(report);
+  }
 
   /// Returns the device of the last open(); empty before.
   const std::optional<UsbDevice>& device() const noexcept { return criteria_.previous; }

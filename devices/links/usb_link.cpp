@@ -20,6 +20,7 @@
 #include "devices/links/latest_writer.hpp"
 #include "devices/links/packet_queue.hpp"
 #include "devices/links/wake_up.hpp"
+#include "devices/report_descriptor.hpp"
 
 namespace wrenchd {
 namespace {
@@ -39,6 +40,13 @@ std::runtime_error open_failure(const UsbDevice& device, const std::string& doin
   }
   return std::runtime_error(describe(device) + ": " + doing + ": " + libusb_strerror(error) +
                             "; unplug the device and connect it again");
+}
+
+std::runtime_error other_device(const UsbDevice& found, const UsbDevice& expected) {
+  const bool only_descriptor = describe(found) == describe(expected);
+  return std::runtime_error("in " + expected.port_path + " is " + describe(found) +
+                            (only_descriptor ? " with another report descriptor" : "") + ", not " +
+                            describe(expected) + ": nothing was written to it; search for the device again");
 }
 
 /// Returns bus and ports in the format of the kernel: "3-1.2".
@@ -99,6 +107,7 @@ struct UsbLink::TransferThread {
   void check_identity(const UsbDevice& device) const;
   void find_endpoints(const UsbDevice& device, const LinkSettings& settings);
   void claim(const UsbDevice& device);
+  void check_report_descriptor(const UsbDevice& device) const;
   void start_serial(const UsbDevice& device, const LinkSettings& settings);
   void prepare_in(const LinkSettings& settings);
   void prepare_out();
@@ -181,6 +190,7 @@ UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSetti
     check_identity(device);
     find_endpoints(device, settings);
     claim(device);
+    check_report_descriptor(device);
     start_serial(device, settings);
     prepare_in(settings);
     prepare_out();
@@ -216,9 +226,24 @@ void UsbLink::TransferThread::check_identity(const UsbDevice& device) const {
                                                      static_cast<int>(text.size()));
     found.serial.assign(text.begin(), text.begin() + std::max(n, 0));
   }
-  if (!found.is_same_device(device))
-    throw std::runtime_error("in " + device.port_path + " is " + describe(found) + ", not " +
-                             describe(device) + ": nothing was written to it; search for the device again");
+  if (!found.is_same_device(device)) throw other_device(found, device);
+}
+
+/// The kernel answers requests to an interface only when it is claimed.
+void UsbLink::TransferThread::check_report_descriptor(const UsbDevice& device) const {
+  constexpr std::uint8_t kFromInterface = 0x81, kGetDescriptor = 6;
+  constexpr std::uint16_t kReportDescriptor = 0x2200;
+  constexpr unsigned kTimeout_ms = 1000;
+  if (!is_hid || device.report_descriptor.empty()) return;
+  UsbDevice found = device;
+  found.report_descriptor.resize(kMaxDescriptorBytes);
+  const int n =
+      libusb_control_transfer(handle, kFromInterface, kGetDescriptor, kReportDescriptor,
+                              static_cast<std::uint16_t>(interface), found.report_descriptor.data(),
+                              static_cast<std::uint16_t>(found.report_descriptor.size()), kTimeout_ms);
+  if (n < 0) throw open_failure(device, "report descriptor", n);
+  found.report_descriptor.resize(static_cast<std::size_t>(n));
+  if (!found.is_same_device(device)) throw other_device(found, device);
 }
 
 void UsbLink::TransferThread::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
@@ -505,7 +530,7 @@ void UsbLink::TransferThread::mark_disconnected() noexcept {
 // --- the servo thread -------------------------------------------------------------------------------------
 
 UsbLink::UsbLink(UsbDevice device, LinkSettings settings)
-    : device_(std::move(device)), settings_(std::move(settings)) {}
+    : device_(std::move(device)), settings_(std::move(settings)), declared_(device_.report_descriptor) {}
 
 UsbLink::~UsbLink() {
   close();

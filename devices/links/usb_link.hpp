@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/clock.hpp"
+#include "devices/declared_reports.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "devices/links/link_settings.hpp"
 #include "devices/links/report_link.hpp"
@@ -42,13 +43,17 @@ class UsbLink final : public ReportLink {
   UsbLink& operator=(const UsbLink&) = delete;
 
   /// Throws std::runtime_error if no device is connected at the port, it is another device now (the link
-  /// writes nothing to it), it cannot be opened, or it has no IN endpoint. Not RT-safe: may take seconds.
+  /// compares ids, serial number and report descriptor, and writes nothing to another device), it cannot be
+  /// opened, or it has no IN endpoint. Not RT-safe: may take seconds.
   void open() override;
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
   /// Submits the report. Returns `not_ready` if the device has no OUT endpoint and is not HID, or as
   /// WriteSlot::submit(). RT-safe.
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
+  bool declares(std::span<const std::uint8_t> report) const noexcept override {
+    return declared_.contains(report);
+  }
   /// Writes the last submitted report within the close_timeout of the settings, then returns the interface to
   /// the kernel driver. Not RT-safe: waits.
   void close() noexcept override;
@@ -65,6 +70,7 @@ class UsbLink final : public ReportLink {
 
   UsbDevice device_;
   LinkSettings settings_;
+  DeclaredReports declared_;  ///< input reports in the descriptor of the device
   std::unique_ptr<TransferThread> transfers_;
 };
 

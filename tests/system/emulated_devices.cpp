@@ -42,9 +42,10 @@ const std::vector<DeviceProfile>& shipped() {
   return profiles;
 }
 
-/// Returns the profile that wrenchd selects for the device. Throws if there is none.
-const DeviceProfile& profile_of(const UsbDevice& device) {
-  const MatchResult match = match_profile(inspect_device(device).identity, shipped());
+/// Returns the profile that wrenchd selects for the device, if the configuration names `named` or no profile.
+/// Throws if there is none.
+const DeviceProfile& profile_of(const UsbDevice& device, std::string_view named = {}) {
+  const MatchResult match = match_profile(inspect_device(device).identity, shipped(), named);
   if (!match.profile) throw std::runtime_error("no profile matches " + describe(device));
   return shipped()[*match.profile];
 }
@@ -81,10 +82,11 @@ struct Plugged {
   UsbDevice listed;
   Driven host;
 
-  Plugged(Backend backend, EmulatedDevice& emulator, const UsbIdentity& identity, const UsbShape& shape)
+  Plugged(Backend backend, EmulatedDevice& emulator, const UsbIdentity& identity, const UsbShape& shape,
+          std::string_view named = {})
       : far(emulator, identity, shape, kPriority),
         listed((far.plug(kPort), await_listed(identity))),
-        host(profile_of(listed), make_link(backend, listed, kPriority)) {}
+        host(profile_of(listed, named), make_link(backend, listed, kPriority)) {}
 
   /// Returns the differences between the profile and the device's descriptor.
   std::size_t disagreements() const {
@@ -119,7 +121,7 @@ void polhem(Backend backend) {
   shape.out_bytes = 64;
   shape.product = "Teensyduino RawHID";
   shape.high_speed = false;
-  Plugged p(backend, board, {0x16c0, 0x0486, "P1"}, shape);
+  Plugged p(backend, board, {0x16c0, 0x0486, "P1"}, shape, "polhem");
   CHECK_THAT(row, p.host.device.profile().name == "polhem");
   CHECK_THAT(row, p.disagreements() == 0);
 

@@ -407,10 +407,10 @@ void blocked_output(Backend backend) {
   CHECK_THAT(row, s.servo.armed() && s.far.record().motors_on);
 }
 
-/// Limit for close() while a write is pending in the kernel: usbhid ends it after 5 s (USB_CTRL_SET_TIMEOUT),
-/// and closing a hidraw node waits for that; libusb cancels its transfers.
+/// While a write is pending in the kernel, usbhid ends it after 5 s (USB_CTRL_SET_TIMEOUT), and closing a
+/// hidraw node waits for that: a thread of its own does. libusb cancels its transfers.
 void deaf_for_ever(Backend backend) {
-  const Duration bound = backend == Backend::hidraw ? Duration(6s) : Duration(600ms);
+  const Duration bound = 600ms;
   Row row(backend, "closed while OUT NAKs",
           format("closed within %.1f s; %s", ms(bound) / 1e3,
                  backend == Backend::hidraw

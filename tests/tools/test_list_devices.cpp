@@ -110,7 +110,9 @@ TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
               "\n\n2 devices have the profile reference_full_speed: to select one of them, write a profile "
               "with inherits = \"reference_full_speed\" and its serial in [match]: \"A1\" \"B2\"\n"));
 
-  const std::string cure = ", and no serial numbers to distinguish them: connect only the intended device\n";
+  const std::string cure =
+      ", and no serial numbers to distinguish them: set usb_port in [device] of wrenchd.toml, "
+      "or connect only the intended device\n";
   CHECK(holds(list({reference_in(1, "A1"), reference_in(2, "A1")}), cure));
   CHECK(holds(list({reference_in(1, ""), reference_in(2, "A1")}), cure));
   CHECK_FALSE(holds(list({reference_in(1, "A1"), space_navigator_in(2)}), "devices have the profile"));
@@ -141,11 +143,20 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
 }
 
 TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_devices]") {
-  const std::string polhem = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
+  // The id does not identify a Polhem: wrenchd must be told.
+  const std::string teensy = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
+  CHECK(holds(teensy, "\n    polhem: 16c0:0486 is the id of every Teensy of PJRC"));
+  CHECK(holds(teensy, "set profile = \"polhem\" in [device] of wrenchd.toml"));
+  CHECK(holds(teensy, "\n    woodenhaptics: it is used only if the configuration names it\n"));
+  KnownProfiles own = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  for (DeviceProfile& profile : own.profiles)
+    if (profile.name == "polhem") profile.match.product = "RawHID";
+  const std::string polhem =
+      device_list(std::vector{hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")}, own,
+                  false, open_to_all);
   CHECK(holds(polhem, "\n  profile polhem: "));
   CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; wrenchd drops rx ry rz of every wrench\n"));
   CHECK(holds(polhem, "\n  the report descriptor agrees with the profile\n"));
-  CHECK(holds(polhem, "\n    woodenhaptics: it is used only if the configuration names it\n"));
 
   UsbDevice falcon = hid(5, {0x0403, 0xcb48, 0, 0}, {}, "FALCON HAPTIC");
   falcon.hidraw_node.clear();

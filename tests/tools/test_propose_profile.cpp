@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/known_profiles.hpp"
 #include "config/load_profile.hpp"
 #include "config/toml_file.hpp"
 #include "devices/layout_check.hpp"
@@ -245,6 +246,23 @@ TEST_CASE("a multi-axis controller with a vendor-defined output report may have 
   CHECK(holds(text, "\n[wrench_report]\nid = \"none\""));
   for (const char* key : {"watchdog_s", "max_force_N", "max_torque_Nm"})
     CHECK(holds(text, "# FILL IN: " + std::string(key) + " ="));
+}
+
+TEST_CASE("a proposal says first which profiles already fit the device", "[propose_profile]") {
+  const auto shipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"})).profiles;
+  DescriptorSource mouse{space_navigator(), "a test", {}, UsbId{0x046d, 0xc626}};
+  CHECK(fitting_profiles(mouse, shipped) == std::vector<std::string>{"spacemouse_split"});
+  const std::string text = propose_profile(mouse, fitting_profiles(mouse, shipped));
+  CHECK(text.rfind(
+            "# The profile spacemouse_split already fits this device: set profile = \"spacemouse_split\"",
+            0) == 0);
+  mouse.id = UsbId{0x1209, 0x4242};  // another id
+  CHECK(fitting_profiles(mouse, shipped).empty());
+  mouse.id.reset();
+  CHECK(fitting_profiles(mouse, shipped) == std::vector<std::string>{"spacemouse_split"});
+  CHECK(holds(propose_profile(mouse, {"spacemouse_split"}), "if its ids match or you name it"));
+  CHECK(fitting_profiles({home_made_combined(), "a test", {}, UsbId{0x256f, 0xc6ff}}, shipped) ==
+        std::vector<std::string>{"spacemouse_combined"});
 }
 
 TEST_CASE("unknown device ids are left open", "[propose_profile]") {

@@ -116,6 +116,17 @@ TEST_CASE("every shipped profile has rules for each of its ids, and none is open
   CHECK_FALSE(has(text, R"(TAG+="uaccess")"));
 }
 
+TEST_CASE("a vendor whose devices match by layout gets access, and nothing else", "[udev_rules]") {
+  const std::string text = udev_rules(kShipped.profiles);
+  const std::size_t at = text.find("# other devices of 256f, by report descriptor:");
+  REQUIRE(at != std::string::npos);
+  const std::string block = text.substr(at, text.find("\n\n", at) - at);
+  CHECK(has(block, " spacemouse_split"));
+  CHECK(has(block, R"(SUBSYSTEM=="hidraw", KERNELS=="*:256F:*", GROUP="wrenchd", MODE="0660")"));
+  CHECK_FALSE(has(block, "LIBINPUT"));
+  CHECK_FALSE(has(block, "SYSTEMD"));
+}
+
 TEST_CASE("wrenchctl udev-rules: each profile adds a rule, and an invalid profile is an error",
           "[udev_rules][wrenchctl]") {
   const TemporaryDirectory dir;

@@ -94,8 +94,11 @@ class DeviceCommands final : public Subcommand {
     profile->add_option("-o,--output", output_, "TOML file to write; - writes standard output")
         ->check(not_empty())
         ->capture_default_str();
-    profile->callback(
-        [this] { write_output(output_, propose_profile(read_descriptor_source(descriptor_))); });
+    profile->callback([this] {
+      const DescriptorSource source = read_descriptor_source(descriptor_);
+      const auto fitting = fitting_profiles(source, known_profiles(SearchPath()).profiles);
+      write_output(output_, propose_profile(source, fitting));
+    });
   }
 
   void run_udev_rules() const {

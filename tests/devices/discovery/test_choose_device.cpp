@@ -36,6 +36,7 @@ UsbDevice falcon() {
   device.interface = 0;
   device.vendor = 0x0403;
   device.product = 0xcb48;
+  device.product_name = "FALCON HAPTIC";
   return device;
 }
 
@@ -85,7 +86,7 @@ TEST_CASE("two equal devices are distinguished by serial number alone", "[choose
 }
 
 TEST_CASE("after unplugging only the same device is selected", "[choose_device]") {
-  const DeviceCriteria wanted = {.profile = "reference_full_speed", .serial = {}, .previous = reference("A")};
+  const DeviceCriteria wanted = {.profile = "reference_full_speed", .previous = reference("A")};
   UsbDevice elsewhere = reference("A");
   elsewhere.port_path = "1-7";
   elsewhere.hidraw_node = "/dev/hidraw9";
@@ -124,6 +125,72 @@ TEST_CASE("a device with a closed protocol is rejected by name", "[choose_device
   const DeviceChoice choice = choose({touch}, {});
   CHECK_FALSE(choice.selection);
   CHECK_FALSE(choice.rejections[0].empty());
+}
+
+// Two SpaceMice of one model have no serial numbers.
+TEST_CASE("two equal devices without serial numbers are distinguished by their USB ports",
+          "[choose_device]") {
+  UsbDevice left = reference(""), right = reference("");
+  left.port_path = "3-1.2";
+  right.port_path = "3-1.4";
+  const DeviceChoice either = choose({left, right}, {.profile = "reference_full_speed"});
+  CHECK_FALSE(either.selection);
+  CHECK_THAT(either.rejections[1], Contains("in USB port 3-1.4") && Contains("usb_port"));
+  const DeviceChoice second = choose({left, right}, {.profile = "reference_full_speed", .usb_port = "3-1.4"});
+  REQUIRE(second.selection);
+  CHECK(second.selection->device == 1);
+  CHECK(second.rejections[0] == "the configuration requires the USB port 3-1.4, it is in 3-1.2");
+  // After unplugging, the device in the other port is not taken for it.
+  CHECK_FALSE(
+      choose({left}, {.profile = "reference_full_speed", .usb_port = "3-1.4", .previous = right}).selection);
+}
+
+TEST_CASE("a stock Teensy is not selected for a Polhem unless it is named", "[choose_device]") {
+  UsbDevice teensy = reference("12345");
+  teensy.vendor = 0x16c0;
+  teensy.product = 0x0486;
+  teensy.report_descriptor = teensy_rawhid();
+  teensy.usage_page = 0xffab;
+  teensy.usage = 0x0200;
+  CHECK(picked(choose({teensy}, {})) == "none");
+  CHECK(picked(choose({teensy}, {.serial = "54321"})) == "none");
+  CHECK(picked(choose({teensy}, {.serial = "12345"})) == "polhem");
+  CHECK(picked(choose({teensy}, {.profile = "polhem"})) == "polhem");
+}
+
+TEST_CASE("a SpaceMouse Enterprise and an unknown SpaceMouse are selected by their descriptors",
+          "[choose_device]") {
+  UsbDevice mouse = reference("");
+  mouse.vendor = 0x256f;
+  mouse.usage_page = 1;
+  mouse.usage = 8;
+  for (const int product : {0xc633, 0xc636, 0xc641}) {
+    mouse.product = static_cast<std::uint16_t>(product);
+    mouse.report_descriptor = space_mouse_enterprise();
+    CHECK(picked(choose({mouse}, {})) == "spacemouse_combined");
+  }
+  mouse.report_descriptor = home_made_split();
+  CHECK(picked(choose({mouse}, {})) == "spacemouse_split");
+}
+
+TEST_CASE("a puck with another range than the profile is not selected", "[choose_device]") {
+  UsbDevice mouse = reference("");
+  mouse.vendor = 0x046d;
+  mouse.product = 0xc626;
+  mouse.report_descriptor = space_navigator();
+  mouse.usage_page = 1;
+  mouse.usage = 8;
+  CHECK(picked(choose({mouse}, {})) == "spacemouse_split");
+  // -32767 to 32767 in place of -350 to 350
+  std::string wide = kSplitAxes;
+  const std::string range = "16 a2 fe 26 5e 01";
+  wide.replace(wide.find(range), range.size(), "16 01 80 26 ff 7f");
+  mouse.report_descriptor = from_hex(wide + "c0");
+  const DeviceChoice choice = choose({mouse}, {});
+  CHECK_FALSE(choice.selection);
+  CHECK_THAT(choice.rejections[0],
+             Contains("full deflection is 350 counts in the profile; the device counts from "
+                      "-32767 to 32767"));
 }
 
 }  // namespace wrenchd

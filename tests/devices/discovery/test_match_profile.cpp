@@ -31,6 +31,12 @@ DeviceIdentity identity(int vendor, int product, std::uint16_t page = 0x01, std:
   return device;
 }
 
+DeviceIdentity falcon_identity() {
+  DeviceIdentity falcon = identity(0x0403, 0xcb48);
+  falcon.product = "FALCON HAPTIC";
+  return falcon;
+}
+
 /// Returns the name of the matching profile, or the reason if there is none.
 std::string matched(const DeviceIdentity& device, std::string_view named = {}) {
   const MatchResult result = match_profile(device, kProfiles, named);
@@ -53,9 +59,9 @@ TEST_CASE("each device of the table matches its profile", "[match_profile]") {
   CHECK(matched(identity(0x256f, 0xc635)) == "spacemouse_split");
   for (const int pid : {0xc62e, 0xc62f, 0xc631, 0xc632, 0xc633, 0xc638, 0xc63a, 0xc652})
     CHECK(matched(identity(0x256f, pid)) == "spacemouse_combined");
-  CHECK(matched(identity(0x16c0, 0x0486, 0xffab, 0x0200)) == "polhem");
-  CHECK(matched(identity(0x1234, 0x0006, 0xffab, 0x0200)) == "polhem_lpc1768");
-  DeviceIdentity falcon = identity(0x0403, 0xcb48);
+  CHECK(matched(identity(0x16c0, 0x0486, 0xffab, 0x0200), "polhem") == "polhem");
+  CHECK(matched(identity(0x1234, 0x0006, 0xffab, 0x0200), "polhem_lpc1768") == "polhem_lpc1768");
+  DeviceIdentity falcon = falcon_identity();
   falcon.usage_page.reset();
   falcon.usage.reset();
   CHECK(matched(falcon) == "falcon");
@@ -85,9 +91,9 @@ TEST_CASE("the report descriptor decides between split and combined, not the id"
 TEST_CASE("a device without report ids is matched by the length of its report", "[match_profile]") {
   DeviceIdentity polhem = identity(0x16c0, 0x0486, 0xffab, 0x0200);
   polhem.input_reports = {{0, 64}};
-  CHECK(matched(polhem) == "polhem");
+  CHECK(matched(polhem, "polhem") == "polhem");
   polhem.input_reports = {{0, 8}};
-  CHECK(matched(polhem).empty());
+  CHECK(matched(polhem, "polhem").empty());
 }
 
 TEST_CASE("every profile that does not match has a reason", "[match_profile]") {
@@ -115,7 +121,7 @@ TEST_CASE("a profile with shared ids is used only if the configuration names it"
 }
 
 TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]") {
-  DeviceIdentity falcon = identity(0x0403, 0xcb48);
+  DeviceIdentity falcon = falcon_identity();
   CHECK(matched(falcon) == "falcon");  // as far as it is known
   falcon.interface = 0;
   CHECK(matched(falcon) == "falcon");
@@ -124,7 +130,7 @@ TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]
   DeviceIdentity polhem =
       identity(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are distinguished by usage
   polhem.interface = 3;
-  CHECK(matched(polhem) == "polhem");
+  CHECK(matched(polhem, "polhem") == "polhem");
 }
 
 TEST_CASE("unusable devices are rejected by name", "[match_profile]") {
@@ -139,7 +145,6 @@ TEST_CASE("unusable devices are rejected by name", "[match_profile]") {
   for (const int pid :
        {0xc650, 0xc651, 0xc654, 0xc655, 0xc656, 0xc657, 0xc658, 0xc664, 0xc665, 0xc668, 0xc62c})
     CHECK_THAT(matched(identity(0x256f, pid)), Contains("no six-axis device"));
-  CHECK_THAT(matched(identity(0x256f, 0xc641)), Contains("sources disagree"));
   CHECK(find_unusable_device({0x256f, 0xc652}) == nullptr);
   CHECK(find_unusable_device({0x256f, 0xc653}) == nullptr);
 }
@@ -177,4 +182,60 @@ TEST_CASE("two equal devices are distinguished by serial number", "[match_profil
   const std::vector<DeviceProfile> same = {any, any};
   CHECK_FALSE(match_profile(device, same).profile);
   CHECK_THAT(match_profile(device, same).rejection, Contains("several profiles match 1209:0007"));
+}
+
+// A wrong device must get no byte. A Polhem sends nothing before it is written to, so only a name can tell it
+// from a stock Teensy with the same id, usage and report lengths.
+TEST_CASE("a profile with a shared id matches only a device that is named", "[match_profile]") {
+  DeviceIdentity teensy = identity(0x16c0, 0x0486, 0xffab, 0x0200);
+  teensy.input_reports = {{0, 64}};
+  teensy.serial = "12345";
+  teensy.product = "Teensyduino RawHID";
+  CHECK(matched(teensy).empty());
+  CHECK_THAT(why_not(teensy, "polhem"), Contains("16c0:0486 is the id of every Teensy of PJRC") &&
+                                            Contains("set profile = \"polhem\" in [device]"));
+  CHECK(matched(teensy, "polhem") == "polhem");
+  const MatchResult by_serial = match_profile(teensy, kProfiles, {}, true);
+  REQUIRE(by_serial.profile);
+  CHECK(kProfiles[*by_serial.profile].name == "polhem");
+
+  std::vector<DeviceProfile> own(1, kProfiles[*by_serial.profile]);
+  own[0].match.product = "Polhem";
+  CHECK(match_profile(teensy, own).rejections[0] ==
+        "it is for the product \"Polhem\", not \"Teensyduino RawHID\"");
+  teensy.product = "Polhem";
+  CHECK(match_profile(teensy, own).profile == 0u);
+  own[0].match.product.clear();
+  own[0].match.serial = "12345";
+  CHECK(match_profile(teensy, own).profile == 0u);
+}
+
+TEST_CASE("a device that must be written to first is matched by more than its id", "[match_profile]") {
+  DeviceIdentity falcon = falcon_identity();
+  falcon.product = "FT232R USB UART";
+  CHECK(matched(falcon).empty());
+  DeviceProfile lock_step = kProfiles.front();
+  lock_step.transport = Transport::hidraw;
+  lock_step.has_output = true;
+  lock_step.stream = StreamStyle::lock_step;
+  lock_step.match = {};
+  lock_step.match.usb = {{0x2341, 0x8036}};
+  CHECK_THAT(match_profile(identity(0x2341, 0x8036), std::vector{lock_step}).rejections[0],
+             Contains("sends nothing before wrenchd writes to it"));
+}
+
+TEST_CASE("any device of 3Dconnexion with six axes is a SpaceMouse", "[match_profile]") {
+  for (const int pid : {0xc636, 0xc641, 0xc6ff}) {
+    DeviceIdentity mouse = identity(0x256f, pid);
+    CHECK(matched(mouse).empty());  // without its descriptor nothing is known
+    mouse.input_reports = {{1, 13}, {3, 5}};
+    CHECK(matched(mouse) == "spacemouse_combined");
+    mouse.input_reports = {{1, 7}, {2, 7}, {3, 5}};
+    CHECK(matched(mouse) == "spacemouse_split");
+    mouse.usage = 0x06;  // a keyboard
+    CHECK(matched(mouse).empty());
+  }
+  DeviceIdentity other = identity(0x1d50, 0xc636);
+  other.input_reports = {{1, 13}};
+  CHECK(matched(other).empty());
 }

@@ -381,8 +381,12 @@ struct MockUsb::Ioctls final : IoctlHandler {
     return {0, 0};
   }
 
-  /// Returns the strings of the device; libusb requests no other descriptors.
+  /// Answers requests for the strings and the report descriptor; libusb requests no other descriptors.
   int control(std::uint8_t* setup) const {
+    if (setup[0] == 0x81 && setup[1] == 6 && setup[3] == 0x22) {
+      std::copy(descriptor.begin(), descriptor.end(), setup + 8);
+      return static_cast<int>(descriptor.size());
+    }
     if (setup[0] != 0x80 || setup[1] != 6 || setup[3] != 3) return -EPIPE;
     Bytes text{4, 3, 0x09, 0x04};
     if (setup[2] != 0) {
@@ -467,6 +471,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   std::condition_variable changed;
   int fifo = -1;
   std::string serial;
+  Bytes descriptor;
   std::deque<Urb> in, out, finished;
   std::deque<Bytes> reports, received;
   std::pair<int, int> set_report{-1, -1};
@@ -478,6 +483,7 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
     : machine_(machine), identity_(std::move(identity)), ioctls_(std::make_unique<Ioctls>()) {
   UMockdevTestbed* const testbed = machine_.testbed();
   ioctls_->serial = identity_.serial;
+  ioctls_->descriptor = report_descriptor(identity_.numbered_reports);
   attach(testbed, usb_node_of(identity_), ioctls_.get());  // before the device is listed, as for hidraw
   usb_path_ = add_usb(testbed, identity_);
   interface_path_ = add_interface(testbed, identity_, usb_path_);

@@ -91,6 +91,7 @@ TEST_CASE("a Polhem over the mock kernel: encoders are read as poses, forces are
   TimePoint t{};
   device.open();
   device.read_newest(now());
+  device.assume_trusted();    // the test writes after each report
   board.advance_to(t, host);  // report at power-on
 
   DeviceSample sample;

@@ -107,6 +107,21 @@ TEST_CASE("the serial number selects one of two equal devices", "[usb]") {
   CHECK_FALSE(first.anything_received());
 }
 
+TEST_CASE("the USB port selects one of two devices without serial numbers", "[usb]") {
+  MockMachine machine;
+  MockHidraw first(machine, {.place = "1-1", .number = 0, .serial = ""});
+  MockHidraw second(machine, {.place = "1-2", .number = 1, .serial = ""});
+  ReconnectingLink link(profile_for(Transport::hidraw), {}, patient(), "1-2");
+  link.open();
+  CHECK(link.device()->port_path == "1-2");
+  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);
+  CHECK(second.receive(32) == Bytes(32, 7));
+  CHECK_FALSE(first.anything_received());
+  ReconnectingLink absent(profile_for(Transport::hidraw), {}, patient(), "1-3");
+  CHECK_THAT(rejection(absent),
+             Contains("in USB port 1-3") && Contains("requires the USB port 1-3, it is in 1-2"));
+}
+
 TEST_CASE("the profile selects the transport", "[usb]") {
   MockMachine machine;
   MockUsb mock(machine, {.hid = false});

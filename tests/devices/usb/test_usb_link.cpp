@@ -273,6 +273,22 @@ TEST_CASE("libusb: another device in the same port is rejected, and nothing is w
   CHECK_FALSE(other.claimed());
 }
 
+TEST_CASE("libusb: a device with another report descriptor is rejected, and nothing is written to it",
+          "[usb]") {
+  MockMachine machine;
+  const MockUsb mock(machine, {});
+  UsbDevice device = list_usb_devices().at(0);
+  device.report_descriptor = report_descriptor(true);
+  {
+    UsbLink same(device);
+    CHECK_NOTHROW(same.open());
+  }
+  device.report_descriptor = report_descriptor(false);
+  UsbLink other(device);
+  CHECK_THROWS_WITH(other.open(), Contains("another report descriptor") && Contains("nothing was written"));
+  CHECK_FALSE(mock.claimed());
+}
+
 TEST_CASE("libusb: two equal devices are read independently", "[usb]") {
   MockMachine machine;
   MockUsb left(machine, {.place = "1-1", .number = 0, .serial = "L"});
