@@ -97,10 +97,6 @@ Json faults_json() {
 struct ViewServer::Server {
   class Page;
 
-  asio::io_context io{1};
-  tcp::acceptor acceptor{io};
-  asio::steady_timer frame_timer{io};
-  asio::signal_set signals{io};
   PageFiles files;
   std::string token = random_token();
   std::uint16_t port = 0;
@@ -109,7 +105,12 @@ struct ViewServer::Server {
   std::map<std::uint64_t, std::weak_ptr<Page>> pages;
   std::uint64_t last_page = 0;
   std::size_t connections = 0;
-  std::unique_ptr<PageLease> lease;  ///< declared last: its threads post to io
+  std::unique_ptr<PageLease> lease;  ///< its threads post to io; the destructor ends them first
+  /// Declared after all that a Page uses: the last handlers of a page end with io, and with them the page.
+  asio::io_context io{1};
+  tcp::acceptor acceptor{io};
+  asio::steady_timer frame_timer{io};
+  asio::signal_set signals{io};
 
   Server(std::uint16_t requested_port, PageFiles page_files);
   ~Server() { lease.reset(); }
