@@ -115,6 +115,10 @@ std::string syntax_message(std::string_view description) {
 
 }  // namespace
 
+std::string read_config_text(const fs::path& file) {
+  return read_text(file);
+}
+
 TomlNode read_toml_file(const fs::path& file) {
   return read_toml_text(read_text(file), file);
 }

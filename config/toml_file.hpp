@@ -35,6 +35,9 @@ struct TomlEntry {
 /// regular, is larger than 1 MiB or nested too deeply, or is not valid UTF-8 or TOML. Not RT-safe: reads a
 /// file.
 TomlNode read_toml_file(const std::filesystem::path& file);
+/// Returns the text of a configuration file, with the checks of read_toml_file() that need no parser. Throws
+/// ConfigError. Not RT-safe: reads a file.
+std::string read_config_text(const std::filesystem::path& file);
 /// Parses text; `file` is for messages.
 TomlNode read_toml_text(const std::string& text, const std::filesystem::path& file);
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "config/load_loopback_script.hpp"
 #include "daemon/control/control_interface.hpp"
@@ -18,8 +19,11 @@
 #include "daemon/control/state_methods.hpp"
 #include "daemon/device_run.hpp"
 #include "daemon/device_start.hpp"
+#include "daemon/output_queue.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/recording/recordings.hpp"
+#include "daemon/standard_streams.hpp"
+#include "daemon/thread_guard.hpp"
 #include "daemon/version.hpp"
 #include "daemon/virtual_time_run.hpp"
 #include "daemon/wall_time_run.hpp"
@@ -73,18 +77,34 @@ class ReloadThread {
  public:
   ReloadThread(Runtime& runtime, EventFeed& feed, const RunContext& context)
       : thread_([&runtime, &feed, context](const std::stop_token& stop) {
+          ThreadGuard guard("reload");
           while (!stop.stop_requested()) {
-            try {
-              if (context.signals.take_reload_request()) reload_all(runtime, feed, context);
-            } catch (const std::exception&) {  // the event feed has reported the error
-            }
+            guard.run([&] { reload_if_requested(runtime, feed, context); });
             std::this_thread::sleep_for(kReloadPeriod);
           }
         }) {}
 
  private:
+  static void reload_if_requested(Runtime& runtime, EventFeed& feed, const RunContext& context) {
+    if (!context.signals.take_reload_request()) return;
+    try {
+      reload_all(runtime, feed, context);
+    } catch (const std::exception&) {  // the event feed has reported the error
+    }
+  }
+
   std::jthread thread_;
 };
+
+/// Returns how the live view prints; null if it is not requested. In virtual time the run waits for the
+/// reader. In wall time the queue drops lines that are not read in time.
+LiveView::Print live_print(const Options& options, OutputQueue& queue) {
+  if (!options.live) return {};
+  if (options.virtual_time) return [](const std::string& text) { write_all(STDOUT_FILENO, text); };
+  return [&queue](std::string text) {
+    queue.post(text.size(), [text = std::move(text)] { write_all(STDOUT_FILENO, text); });
+  };
+}
 
 using RunLoop = std::function<Fault(Runtime&, Recordings&, LiveView&)>;
 
@@ -101,7 +121,9 @@ Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link,
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                runtime.config().profile.name, runtime.scene().tool().hull.vertices_T_m.size(),
                runtime.scene().obstacle_count(), settings.servo.rate_Hz);
-  LiveView view(context.options.live, runtime.config().profile);
+  OutputQueue live_output;
+  LiveView view(live_print(context.options, live_output), isatty(STDOUT_FILENO) != 0,
+                runtime.config().profile);
   Fault fault = Fault::none;
   double run_s = 0.0;
   {
@@ -114,8 +136,16 @@ Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link,
     const TimePoint start = clock.now();
     fault = run_loop(runtime, recordings, view);
     run_s = seconds(clock.now() - start);
+    // The hand is released. The recordings are closed before the threads that may work for long.
+    context.deadline.start(exit_code(fault));
+    const StopDeadline::RecordingTime recording(context.deadline);
+    recordings.close();
   }
   view.close(runtime.loop(), run_s);
+  live_output.close();
+  if (live_output.dropped() > 0)
+    spdlog::warn("{} outputs of the live view were dropped: standard output was not read in time",
+                 live_output.dropped());
   return fault;
 }
 

@@ -61,8 +61,8 @@ bool stderr_is_journal() {
   return std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino) == stream;
 }
 
-void log_to_journal() {
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("journal", std::make_shared<JournalSink>()));
+std::shared_ptr<spdlog::sinks::sink> make_journal_sink() {
+  return std::make_shared<JournalSink>();
 }
 
 JournalFields::JournalFields(JournalFieldList fields) : previous_(std::exchange(fields_here, {})) {

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+namespace spdlog::sinks {
+class sink;
+}
 
 namespace wrenchd {
 
@@ -14,9 +19,9 @@ using JournalFieldList = std::vector<std::pair<std::string, std::string>>;
 /// RT-safe: system call.
 bool stderr_is_journal();
 
-/// Sends all later log entries to the system journal, with priority and the current JournalFields. Call it
-/// once, before other threads log. Not RT-safe: allocates.
-void log_to_journal();
+/// Returns a sink that sends log entries to the system journal, with priority and the JournalFields of the
+/// thread that calls it. Its log() waits for the journal. Not RT-safe: allocates.
+std::shared_ptr<spdlog::sinks::sink> make_journal_sink();
 
 /// Adds fields to the log entries of the calling thread while this object lives. Has no effect if the log
 /// does not go to the journal. Not RT-safe: allocates.

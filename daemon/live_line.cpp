@@ -70,23 +70,15 @@ std::string live_line(const TickRecord& r, const LoopTiming& timing, ShownWrench
       1e3 * F[5], remark(r, shown), times(timing.tick));
 }
 
-void add_sample(RunTotals& totals, const TickRecord& r) {
-  ++totals.samples;
-  if (r.contacts > 0) ++totals.samples_in_contact;
-  totals.ticks = r.tick + 1;
-  const std::array<double, 6> F = wrench(r, totals.shown);
-  totals.max_force_N = std::max(totals.max_force_N, length(F.data()));
-  totals.max_torque_Nm = std::max(totals.max_torque_Nm, length(&F[3]));
-}
-
-std::string summary(const RunTotals& totals, const LoopTiming& timing) {
+std::string summary(const LoopTotals& totals, const LoopTiming& timing, double seconds, ShownWrench shown) {
+  const bool on_tool = shown == ShownWrench::on_tool;
+  const double force_N = on_tool ? totals.max_force_on_tool_N : totals.max_force_sent_N;
+  const double torque_Nm = on_tool ? totals.max_torque_on_tool_Nm : totals.max_torque_sent_Nm;
   std::string text = fmt::format(
-      "{} ticks in {:.2f} s ({:.1f} Hz); in contact in {} of {} samples; largest force {:.2f} N, torque "
-      "{:.1f} "
+      "{} ticks in {:.2f} s ({:.1f} Hz); in contact in {} ticks; largest force {:.2f} N, torque {:.1f} "
       "mN.m{}\n",
-      totals.ticks, totals.seconds, static_cast<double>(totals.ticks) / std::max(totals.seconds, 1e-9),
-      totals.samples_in_contact, totals.samples, totals.max_force_N, 1e3 * totals.max_torque_Nm,
-      totals.shown == ShownWrench::on_tool ? " on the tool, not sent: no motors" : "");
+      totals.ticks.load(), seconds, totals.rate_Hz(), totals.ticks_in_contact.load(), force_N,
+      1e3 * torque_Nm, on_tool ? " on the tool, not sent: no motors" : "");
   text += fmt::format("{:<14} {:>24}\n", "", "p50 / p99.9 / max [us]");
   text += fmt::format("{:<14} {:>24}\n", "wake latency", times(timing.wake_latency));
   text += fmt::format("{:<14} {:>24}\n", "tick", times(timing.tick));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "daemon/servo/loop_timing.hpp"
+#include "daemon/servo/loop_totals.hpp"
 #include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {
@@ -20,22 +21,9 @@ enum class ShownWrench : std::uint8_t {
 std::string live_line(const TickRecord& record, const LoopTiming& timing,
                       ShownWrench shown = ShownWrench::sent);
 
-/// Totals of a run. The live view samples the loop every 100 ms.
-struct RunTotals {
-  ShownWrench shown = ShownWrench::sent;
-  double seconds = 0.0;
-  std::uint64_t ticks = 0;
-  std::uint64_t samples_in_contact = 0;  ///< samples with at least one contact
-  std::uint64_t samples = 0;
-  double max_force_N = 0.0;    ///< largest force of all samples
-  double max_torque_Nm = 0.0;  ///< largest torque of all samples
-};
-
-/// Adds a tick record to the totals. Not RT-safe.
-void add_sample(RunTotals& totals, const TickRecord& record);
-
-/// Returns several lines for the end of a run: rate, contact, times of each stage, overruns. Not RT-safe:
-/// allocates.
-std::string summary(const RunTotals& totals, const LoopTiming& timing);
+/// Returns several lines for the end of a run: ticks, rate, contact, largest wrench, times of each stage,
+/// overruns. seconds: duration of the run. Not RT-safe: allocates.
+std::string summary(const LoopTotals& totals, const LoopTiming& timing, double seconds,
+                    ShownWrench shown = ShownWrench::sent);
 
 }  // namespace wrenchd

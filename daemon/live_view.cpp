@@ -1,42 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/live_view.hpp"
 
-#include <cstdio>
-
-#include <unistd.h>
+#include <utility>
 
 #include "daemon/servo/servo_loop.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Samples between two lines where standard output is no terminal.
+/// Samples between two lines where the text goes to no terminal.
 constexpr int kSamplesPerLine = 5;
 
 }  // namespace
 
-LiveView::LiveView(bool shown, const DeviceProfile& profile)
-    : shown_(shown), terminal_(isatty(STDOUT_FILENO) != 0) {
-  if (!profile.has_output) totals_.shown = ShownWrench::on_tool;
-}
+LiveView::LiveView(Print print, bool terminal, const DeviceProfile& profile)
+    : print_(std::move(print)),
+      terminal_(terminal),
+      shown_(profile.has_output ? ShownWrench::sent : ShownWrench::on_tool) {}
 
 void LiveView::sample(ServoLoop& loop) {
   TickRecord record;
-  if (!loop.telemetry().latest_record().read(record)) return;
-  add_sample(totals_, record);
-  if (!shown_ || (!terminal_ && totals_.samples % kSamplesPerLine != 0)) return;
-  std::fputs(terminal_ ? "\r\x1b[K" : "", stdout);
-  std::fputs(live_line(record, loop.telemetry().timing(), totals_.shown).c_str(), stdout);
-  std::fputs(terminal_ ? "" : "\n", stdout);
-  std::fflush(stdout);
+  if (!print_ || !loop.telemetry().latest_record().read(record)) return;
+  if (!terminal_ && ++samples_ % kSamplesPerLine != 0) return;
+  const std::string line = live_line(record, loop.telemetry().timing(), shown_);
+  print_(terminal_ ? "\r\x1b[K" + line : line + "\n");
 }
 
 void LiveView::close(const ServoLoop& loop, double seconds) {
-  if (!shown_) return;
-  totals_.seconds = seconds;
-  std::fputs(terminal_ ? "\n" : "", stdout);
-  std::fputs(summary(totals_, loop.telemetry().timing()).c_str(), stdout);
-  std::fflush(stdout);
+  if (!print_) return;
+  print_((terminal_ ? "\n" : "") +
+         summary(loop.telemetry().totals(), loop.telemetry().timing(), seconds, shown_));
 }
 
 }  // namespace wrenchd

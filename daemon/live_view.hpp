@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <string>
+
 #include "core/device_profile.hpp"
 #include "daemon/live_line.hpp"
 
@@ -8,22 +12,25 @@ namespace wrenchd {
 
 class ServoLoop;
 
-/// Prints the state of the servo loop to standard output: on a terminal one line that it overwrites,
-/// elsewhere a line for every fifth sample. Not RT-safe: prints. One thread.
+/// Prints the state of the servo loop: on a terminal one line that it overwrites, elsewhere a line for every
+/// fifth sample. Not RT-safe: prints. One thread.
 class LiveView {
  public:
-  /// shown: false prints nothing.
-  LiveView(bool shown, const DeviceProfile& profile);
+  using Print = std::function<void(std::string text)>;
 
-  /// Adds the newest tick record to the totals and prints it. Does nothing before the first tick.
+  /// print: null prints nothing. terminal: the text goes to a terminal.
+  LiveView(Print print, bool terminal, const DeviceProfile& profile);
+
+  /// Prints the newest tick record. Does nothing before the first tick.
   void sample(ServoLoop& loop);
-  /// Prints the summary of the run.
+  /// Prints the summary of the run. seconds: duration of the run.
   void close(const ServoLoop& loop, double seconds);
 
  private:
-  bool shown_;
+  Print print_;
   bool terminal_;
-  RunTotals totals_;
+  ShownWrench shown_;
+  std::uint64_t samples_ = 0;
 };
 
 }  // namespace wrenchd

@@ -1,53 +1,47 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cstdio>
 #include <exception>
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "daemon/daemon_run.hpp"
-#include "daemon/journal.hpp"
+#include "daemon/log_output.hpp"
 #include "daemon/options.hpp"
 #include "daemon/process_signals.hpp"
 #include "daemon/service_notify.hpp"
+#include "daemon/standard_streams.hpp"
+#include "daemon/stop_deadline.hpp"
 
 // Command line -> configuration -> run -> exit code.
 
 namespace {
 
-constexpr int kExitRejected =
-    1;  ///< a file, a device or the kernel rejected the configuration; the loop did not start
-constexpr int kExitFault = 3;  ///< the run ended with a fault that no client acknowledged
-
-void set_up_log(bool verbose) {
-  if (wrenchd::stderr_is_journal()) {
-    wrenchd::log_to_journal();
-  } else {
-    spdlog::set_default_logger(spdlog::stderr_color_mt("wrenchd"));
-    spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+int run(const wrenchd::Options& options, wrenchd::LogOutput& log) {
+  const wrenchd::ProcessSignals signals;
+  wrenchd::ServiceNotify service;
+  try {
+    wrenchd::StopDeadline deadline(signals, [&log] { log.close(); });
+    return wrenchd::exit_code(
+        wrenchd::run_daemon(wrenchd::load_run_config(options), {options, signals, service, deadline}));
+  } catch (const std::exception& error) {
+    log.print_error(std::string("wrenchd: ") + error.what() + "\n");
+    service.stopping(std::string("rejected: ") + error.what());
+    return wrenchd::kExitRejected;
   }
-  if (verbose) spdlog::set_level(spdlog::level::debug);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!wrenchd::open_standard_streams()) return wrenchd::kExitRejected;
   CLI::App app;
   wrenchd::Options options;
   wrenchd::add_options(app, options);
   CLI11_PARSE(app, argc, argv);
-  set_up_log(options.verbose);
-  const wrenchd::ProcessSignals signals;
-  wrenchd::ServiceNotify service;
-  try {
-    const wrenchd::Fault fault =
-        wrenchd::run_daemon(wrenchd::load_run_config(options), {options, signals, service});
-    return fault == wrenchd::Fault::none ? 0 : kExitFault;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "wrenchd: %s\n", error.what());
-    service.stopping(std::string("rejected: ") + error.what());
-    return kExitRejected;
-  }
+  wrenchd::LogOutput log(options.verbose);
+  const int code = run(options, log);
+  // If the log is not read, a thread is left in a write, and must not meet the destructors of the process.
+  if (!log.close()) ::_exit(code);
+  return code;
 }

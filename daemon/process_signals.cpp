@@ -1,29 +1,42 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/process_signals.hpp"
 
+#include <array>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
+#include <string>
 #include <thread>
 
+#include <unistd.h>
+
 #include "daemon/servo/servo_loop.hpp"
+#include "daemon/standard_streams.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// A thread of the link writes the zero wrench of a release. A process that aborts leaves it this time.
-constexpr auto kReleaseTime = std::chrono::milliseconds(50);
+/// Longest wait for the servo thread to release the hand. A loop that does not tick in this time hangs; then
+/// the writer thread of the link has sent a zero wrench (devices/links/host_watchdog.hpp).
+constexpr long kReleaseWithin_us = 100'000;
+/// Time between two requests to release. The loop ticks once a millisecond, as configured by default.
+constexpr long kRequestPeriod_us = 200;
+/// A thread of the link writes the zero wrench of a release. A process that ends leaves it this time.
+constexpr long kWriteTime_us = 50'000;
 
 // A signal handler has no argument, so its state is static. It uses lock-free atomics only.
 std::atomic<bool> stop_flag{false};
 std::atomic<bool> reload_flag{false};
 std::atomic<ServoLoop*> target{nullptr};
 std::atomic<int> handlers_using_target{0};
+std::atomic<pid_t> servo_thread{0};  ///< 0: no thread ticks the loop
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free &&
                   std::atomic<CommandSet>::is_always_lock_free &&
-                  std::atomic<ServoLoop*>::is_always_lock_free,
+                  std::atomic<ServoLoop*>::is_always_lock_free && std::atomic<State>::is_always_lock_free,
               "a signal handler may only use lock-free atomics");
 
 /// Calls `use` with the servo loop, if there is one. The count keeps ~SignalTarget() from returning
@@ -35,28 +48,80 @@ void with_target(const Use& use) {
   handlers_using_target.fetch_sub(1);
 }
 
-void set_handler(int signal, void (*handler)(int)) {
-  struct sigaction action {};
+void sleep_us(long us) noexcept {
+  timespec time{0, us * 1000};
+  while (::nanosleep(&time, &time) != 0 && errno == EINTR) {
+  }
+}
+
+struct sigaction set_handler(int signal, void (*handler)(int)) {
+  struct sigaction action {
+  }, previous{};
   action.sa_handler = handler;
-  sigaction(signal, &action, nullptr);
+  sigaction(signal, &action, &previous);
+  return previous;
+}
+
+constexpr std::array kCrashSignals = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGSYS, SIGTRAP, SIGABRT, SIGXCPU};
+/// The actions of kCrashSignals before this file replaced them: the default, or those of a sanitizer.
+std::array<struct sigaction, kCrashSignals.size()> previous_actions;
+
+/// Restores the previous action, which ends the process when this handler returns: the fault occurs again, or
+/// raise() repeats the signal.
+void release_and_crash(int signal) {
+  release_hand_before_exit();
+  for (std::size_t i = 0; i < kCrashSignals.size(); ++i)
+    if (kCrashSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
+  ::raise(signal);
 }
 
 [[noreturn]] void release_and_abort() {
-  with_target([](ServoLoop& loop) {
-    loop.release(std::chrono::steady_clock::now());
-    std::this_thread::sleep_for(kReleaseTime);
-  });
+  release_hand_before_exit();
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+    write_error_without_waiting("wrenchd: ended by std::terminate()\n");
+  } catch (const std::exception& error) {
+    write_error_without_waiting(std::string("wrenchd: ended by an exception that nobody handles: ") +
+                                error.what() + "\n");
+  } catch (...) {
+    write_error_without_waiting("wrenchd: ended by an unknown exception that nobody handles\n");
+  }
+  set_handler(SIGABRT, SIG_DFL);
   std::abort();
 }
 
 }  // namespace
 
+void release_hand_before_exit() noexcept {
+  with_target([](ServoLoop& loop) {
+    const auto released = [&loop] { return loop.telemetry().state() == State::shutdown; };
+    const pid_t thread = servo_thread.load();
+    const bool no_tick_runs = thread == 0 || thread == ::gettid();
+    if (no_tick_runs && !released()) loop.release(std::chrono::steady_clock::now());
+    if (no_tick_runs) return sleep_us(kWriteTime_us);
+    // The stop removes the force in the next tick, whatever the state; then the loop can end at once. The
+    // request is repeated, because a loop that ticks on takes the device for a new one.
+    for (long us = 0, since_release_us = 0; us < kReleaseWithin_us && since_release_us < kWriteTime_us;
+         us += kRequestPeriod_us) {
+      if (since_release_us > 0 || released()) since_release_us += kRequestPeriod_us;
+      loop.requests().request(kStop | kQuit);
+      sleep_us(kRequestPeriod_us);
+    }
+  });
+}
+
 ProcessSignals::ProcessSignals() {
-  for (const int signal : {SIGINT, SIGTERM}) set_handler(signal, [](int) { stop_flag.store(true); });
+  const auto stop = [](int) { stop_flag.store(true); };
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGPWR, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGSTKFLT})
+    set_handler(signal, stop);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) set_handler(signal, stop);
   set_handler(SIGHUP, [](int) { reload_flag.store(true); });
   set_handler(SIGUSR1, [](int) { with_target([](ServoLoop& loop) { loop.requests().request(kStop); }); });
   set_handler(SIGUSR2,
               [](int) { with_target([](ServoLoop& loop) { loop.requests().request(kAcknowledge); }); });
+  for (const int signal : {SIGPIPE, SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU}) set_handler(signal, SIG_IGN);
+  for (std::size_t i = 0; i < kCrashSignals.size(); ++i)
+    previous_actions[i] = set_handler(kCrashSignals[i], release_and_crash);
   std::set_terminate(release_and_abort);
 }
 
@@ -75,6 +140,14 @@ SignalTarget::SignalTarget(ServoLoop& loop) noexcept {
 SignalTarget::~SignalTarget() {
   target.store(nullptr);
   while (handlers_using_target.load() != 0) std::this_thread::yield();
+}
+
+ServoThreadMark::ServoThreadMark() noexcept {
+  servo_thread.store(::gettid());
+}
+
+ServoThreadMark::~ServoThreadMark() {
+  servo_thread.store(0);
 }
 
 }  // namespace wrenchd

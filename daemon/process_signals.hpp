@@ -6,21 +6,29 @@ namespace wrenchd {
 class ServoLoop;
 
 /// Installs the signal handlers and the terminate handler of the process. Create one object, in main(),
-/// before other threads start.
+/// before other threads start. Afterwards no signal ends the process before the hand is released, except
+/// SIGKILL:
 ///
-///   SIGINT, SIGTERM   end the run
-///   SIGHUP            read the configuration again
-///   SIGUSR1           emergency stop
-///   SIGUSR2           acknowledge a stop or a fault
+///   SIGINT, SIGTERM, SIGQUIT, SIGPWR      end the run
+///   SIGALRM, SIGVTALRM, SIGPROF, SIGIO,   end the run: nobody sends them to wrenchd by design
+///   SIGSTKFLT, real-time signals
+///   SIGHUP                                reads the configuration again
+///   SIGUSR1                               emergency stop
+///   SIGUSR2                               acknowledges a stop or a fault
+///   SIGPIPE, SIGXFSZ                      ignored: the write fails, and its caller reports the error
+///   SIGTSTP, SIGTTIN, SIGTTOU             ignored: a suspended process cannot release the hand
+///   SIGSEGV, SIGBUS, SIGILL, SIGFPE,      release the hand, then end the process as without a handler
+///   SIGSYS, SIGTRAP, SIGABRT, SIGXCPU
 ///
-/// std::terminate() releases the hand before the process aborts. All functions may be called from any thread.
+/// std::terminate() releases the hand, writes the reason to standard error and aborts. All functions may be
+/// called from any thread.
 class ProcessSignals {
  public:
   ProcessSignals();
   ProcessSignals(const ProcessSignals&) = delete;
   ProcessSignals& operator=(const ProcessSignals&) = delete;
 
-  /// Returns true after SIGINT or SIGTERM.
+  /// Returns true after a signal that ends the run.
   bool stop_requested() const noexcept;
   /// Returns true once after each SIGHUP, and clears that request.
   bool take_reload_request() const noexcept;
@@ -36,5 +44,20 @@ class SignalTarget {
   SignalTarget(const SignalTarget&) = delete;
   SignalTarget& operator=(const SignalTarget&) = delete;
 };
+
+/// While this object lives, the calling thread ticks the loop of the signal target. A crash on this thread
+/// releases the hand directly; a crash on any other thread asks this thread to release it, because a release
+/// must not run beside a tick.
+class ServoThreadMark {
+ public:
+  ServoThreadMark() noexcept;
+  ~ServoThreadMark();
+  ServoThreadMark(const ServoThreadMark&) = delete;
+  ServoThreadMark& operator=(const ServoThreadMark&) = delete;
+};
+
+/// Releases the hand because the process ends without the end of its run. Returns when the zero wrench is
+/// written, after 0.1 s at most. Does nothing if there is no signal target. Any thread. Async-signal-safe.
+void release_hand_before_exit() noexcept;
 
 }  // namespace wrenchd

@@ -8,6 +8,7 @@
 #include "daemon/options.hpp"
 #include "daemon/process_signals.hpp"
 #include "daemon/service_notify.hpp"
+#include "daemon/stop_deadline.hpp"
 
 namespace wrenchd {
 
@@ -18,6 +19,7 @@ struct RunContext {
   const Options& options;
   const ProcessSignals& signals;
   ServiceNotify& service;
+  StopDeadline& deadline;
 };
 
 /// Time between two samples of the live view, two checks of the real-time state and two pumps of the

@@ -110,7 +110,10 @@ SharedState& Runtime::enable_shared_state() {
 RecordingHeader Runtime::recording_header() const {
   RecordingHeader header = recorded_texts_;
   header.rate_Hz = tick_rate_Hz(config_);
-  add_meshes(reconfigurator_.scene(), header);
+  const auto scene = reconfigurator_.present_scene();
+  header.scene = scene->text;
+  header.scene_file = scene->settings.file;
+  add_meshes(scene->settings, header);
   set_start_time(clock_, header);
   return header;
 }

@@ -74,7 +74,8 @@ class Runtime {
   /// must precede the loop; later calls return the same memory. Throws std::system_error.
   SharedState& enable_shared_state();
 
-  /// Returns the header of a recording that begins now. Reads the mesh files.
+  /// Returns the header of a recording that begins now, with the present scene. Reads the mesh files. Does
+  /// not wait while another scene is being built.
   RecordingHeader recording_header() const;
 
  private:
@@ -82,7 +83,7 @@ class Runtime {
   const Clock& clock_;
   std::shared_ptr<const Scene> scene_;
   std::vector<std::string> mesh_remarks_;
-  RecordingHeader recorded_texts_;  ///< texts of the files at the start; the files may change later
+  RecordingHeader recorded_texts_;  ///< texts of the files at the start, except the scene's
   ProfileDevice device_;
   std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;

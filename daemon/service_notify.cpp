@@ -8,6 +8,8 @@
 
 #include <systemd/sd-daemon.h>
 
+#include "daemon/thread_guard.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -100,9 +102,10 @@ std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop) {
 ServiceNotify::ServiceNotify() : enabled_(std::getenv("NOTIFY_SOCKET") != nullptr) {
   if (!enabled_) return;
   thread_ = std::jthread([this, period = message_period()](const std::stop_token& stop) {
+    ThreadGuard guard("notification of the service manager");
     std::unique_lock lock(mutex_);
     do {
-      send_report();
+      guard.run([this] { send_report(); });
     } while (!changed_.wait_for(lock, stop, period, [&stop] { return stop.stop_requested(); }));
   });
 }

@@ -11,6 +11,7 @@ Fault run_in_virtual_time(Runtime& runtime, const RunContext& context, Recording
   const Duration period = from_seconds(1.0 / runtime.config().settings.servo.rate_Hz);
   TimePoint next_sample = clock.now() + kSamplePeriod;
   Fault fault = Fault::none;
+  const ServoThreadMark mark;
   while (fault != Fault::device_lost && clock.now() < end && !context.signals.stop_requested()) {
     clock.sleep_until(clock.now() + period);
     fault = loop.tick(clock.now(), clock.now());

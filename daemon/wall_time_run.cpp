@@ -15,6 +15,7 @@
 #include "daemon/contact_rate.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/servo/realtime_watch.hpp"
+#include "daemon/thread_guard.hpp"
 
 namespace wrenchd {
 namespace {
@@ -44,6 +45,7 @@ class ServoThread {
 
  private:
   void run(Runtime& runtime, WallClock& clock) {
+    const ServoThreadMark mark;
     try {
       id_.store(gettid());
       prepared_.set_value(prepare_servo_thread(runtime.config().settings.servo));
@@ -113,12 +115,15 @@ Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::s
       device);
   RealtimeWatch realtime(servo_thread.id());
   ContactRateLog contact_rate(runtime);
+  ThreadGuard guard("supervision of the loop");
   while (!context.signals.stop_requested() && !servo_thread.ended() && clock.now() < end) {
     std::this_thread::sleep_until(requests.next_time(clock.now() + kSamplePeriod));
     requests.send_due(loop, clock.now());
-    view.sample(loop);
-    contact_rate.check();
-    if (const auto change = realtime.check()) report_realtime(*change, runtime);
+    guard.run([&] { view.sample(loop); });
+    guard.run([&] { contact_rate.check(); });
+    guard.run([&] {
+      if (const auto change = realtime.check()) report_realtime(*change, runtime);
+    });
   }
   const Fault latched = latched_fault(loop);
   if (!servo_thread.ended()) context.service.stopping("stopping");

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/standard_streams.hpp"
 #include "daemon/version.hpp"
 #include "tools/commands/subcommand.hpp"
 
@@ -40,6 +41,7 @@ int exit_code_of(const std::vector<std::unique_ptr<Subcommand>>& commands) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!open_standard_streams()) return 1;  // else a file that is opened gets the number of a closed stream
   CLI::App app("wrenchctl: controls wrenchd, checks its input files, and computes projections and wrenches.");
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
   app.footer(

@@ -14,6 +14,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "daemon/thread_guard.hpp"
+
 // A round: wait for input; accept new clients; then serve each client, the one with the most tokens first:
 // read, process a few lines, send replies and events. At its end the round checks the lease.
 
@@ -109,26 +111,31 @@ ControlSocket::~ControlSocket() {
 }
 
 void ControlSocket::run(const std::stop_token& stop) {
+  ThreadGuard guard("control socket");
   std::vector<Client*> turns;
+  turns.reserve(kMaxClients + kAcceptPerRound);
   while (!stop.stop_requested()) {
     std::array<epoll_event, kMaxClients + 2> events{};
     const int count =
         epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), wait_ms(wall_now()));
     for (int i = 0; i < count; ++i)
-      handle_epoll_event(events[static_cast<std::size_t>(i)].data.u64,
-                         events[static_cast<std::size_t>(i)].events);
+      guard.run([&] {
+        handle_epoll_event(events[static_cast<std::size_t>(i)].data.u64,
+                           events[static_cast<std::size_t>(i)].events);
+      });
     const TimePoint now = wall_now();
-    accept_clients(now);
-    send_finished_results();
+    guard.run([&] { accept_clients(now); });
+    guard.run([&] { send_finished_results(); });
     turns.clear();
     for (auto& [number, client] : clients_) turns.push_back(&client);
     std::stable_sort(turns.begin(), turns.end(),
                      [](const Client* a, const Client* b) { return a->tokens > b->tokens; });
-    for (Client* client : turns) serve(*client, now);
-    lease_.check(wall_now());
-    remove_clients();
+    for (Client* client : turns)
+      if (!guard.run([&] { serve(*client, now); })) client->to_remove = true;
+    guard.run([&] { lease_.check(wall_now()); });
+    guard.run([&] { remove_clients(); });
   }
-  flush_before_exit();
+  guard.run([&] { flush_before_exit(); });
 }
 
 /// Returns the time until the next action that no descriptor triggers [ms]; -1: none.
@@ -316,6 +323,10 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {
       if (request.wants_reply) finished.line = error_line(request.id, error);
+    } catch (const std::exception& error) {  // no memory for the reply
+      finished.fd.reset();
+      if (request.wants_reply)
+        finished.line = error_line(request.id, RpcError(RpcCode::internal_error, error.what()));
     }
     {
       const std::scoped_lock lock(finished_mutex_);

@@ -29,15 +29,23 @@ Json times_json(const DurationHistogram& times) {
           {"max_us", us(times.max())}};
 }
 
-Json limits_json(const RunConfig& config) {
-  const WrenchLimits limits(config.settings.limits, config.profile);
+/// The limits that the loop holds now, which a reload may have changed.
+Json limits_json(const RunConfig& config, const LimitSettings& limits) {
   const bool watched = !config.profile.has_output || config.profile.watchdog_s > 0.0;
-  return {{"max_force_N", limits.max_force_N()},
-          {"max_torque_Nm", limits.max_torque_Nm()},
-          {"force_slew_N_per_s", config.settings.limits.force_slew_N_per_s},
-          {"torque_slew_Nm_per_s", config.settings.limits.torque_slew_Nm_per_s},
-          {"soft_start_s", config.settings.limits.soft_start_s},
+  return {{"max_force_N", limits.max_force_N},
+          {"max_torque_Nm", limits.max_torque_Nm},
+          {"force_slew_N_per_s", limits.force_slew_N_per_s},
+          {"torque_slew_Nm_per_s", limits.torque_slew_Nm_per_s},
+          {"soft_start_s", limits.soft_start_s},
           {"authority", watched ? 1.0 : ProfileDevice::kAuthorityWithoutWatchdog}};
+}
+
+/// The newest fault that changed the state, and when it was raised on the clock of the ticks.
+Json last_fault_json(const FeedSnapshot& now) {
+  if (now.last_fault == Fault::none) return nullptr;
+  Json fault = fault_json(now.last_fault);
+  fault["time_ns"] = now.last_fault_at.time_since_epoch().count();
+  return fault;
 }
 
 Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
@@ -48,6 +56,7 @@ Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
   return {{"sequence", now.sequence},
           {"state", name(now.state)},
           {"cause", fault_json(now.cause)},
+          {"last_fault", last_fault_json(now)},
           {"armed_by", armed_by},
           {"lease", lease.holder() ? Json(lease.holder()->identity) : Json(nullptr)},
           {"proxy_initialization", now.proxy_initialization}};
@@ -256,7 +265,7 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
       {},
       "The force fades out within 100 ms, no matter which client armed. The lease keeps its holder.",
       [context](const Json&, const Caller&) {
-        context.runtime.loop().requests().disarm();
+        context.lease.disarm();
         return MethodResult(Json{{"requested", "disarm"}});
       }});
   table.add(MethodRow{"acknowledge",
@@ -285,25 +294,27 @@ Json status_json(const DaemonContext& context) {
   const LoopTiming& timing = loop.telemetry().timing();
   context.feed.drain();  // the snapshot includes all events up to now
   const FeedSnapshot now = context.feed.snapshot();
+  const auto scene = context.runtime.reconfigurator().present_scene();
   Json status = state_json(context, now);
-  status.update(
-      {{"version", kVersion},
-       {"tick", timing.tick.count()},
-       {"device",
-        {{"profile", config.profile.name},
-         {"present", now.state != State::disconnected && now.state != State::shutdown},
-         {"simulated", config.simulated}}},
-       {"scene",
-        {{"file", config.scene.file.string()}, {"obstacles", context.runtime.scene().obstacle_count()}}},
-       {"rates", {{"rate_Hz", config.settings.servo.rate_Hz}}},
-       {"limits", limits_json(config)},
-       {"stiffness_scale", now.stiffness_scale},
-       {"timing",
-        {{"tick", times_json(timing.tick)},
-         {"wake_latency", times_json(timing.wake_latency)},
-         {"overruns", timing.overruns.load()},
-         {"skipped_ticks", timing.skipped_ticks.load()}}},
-       {"dropped_events", loop.telemetry().dropped_events()}});
+  status.update({{"version", kVersion},
+                 {"tick", timing.tick.count()},
+                 {"device",
+                  {{"profile", config.profile.name},
+                   {"present", now.state != State::disconnected && now.state != State::shutdown},
+                   {"simulated", config.simulated}}},
+                 {"scene",
+                  {{"file", scene->settings.file.string()},
+                   {"obstacles", scene->obstacle_names.size()},
+                   {"rendering_id", scene->rendering_id}}},
+                 {"rates", {{"rate_Hz", config.settings.servo.rate_Hz}}},
+                 {"limits", limits_json(config, loop.telemetry().limits())},
+                 {"stiffness_scale", now.stiffness_scale},
+                 {"timing",
+                  {{"tick", times_json(timing.tick)},
+                   {"wake_latency", times_json(timing.wake_latency)},
+                   {"overruns", timing.overruns.load()},
+                   {"skipped_ticks", timing.skipped_ticks.load()}}},
+                 {"dropped_events", loop.telemetry().dropped_events()}});
   for (const auto& [name, row] : context.status_sections) status[name] = row();
   return status;
 }

@@ -34,7 +34,7 @@ EventDescription describe_event(const Event::FaultRaised& e) {
   return {"fault",
           is_severe(e.fault) ? EventLevel::error : EventLevel::warning,
           fmt::format("{}: {}{}; {}", row.name, row.message, measured(e.fault, e.value), row.cure),
-          {{"fault", fault_json(e.fault)}, {"value", e.value}}};
+          {{"fault", fault_json(e.fault)}, {"value", e.value}, {"repeats", 0}}};
 }
 
 EventDescription describe_event(const Event::StiffnessScaled& e) {

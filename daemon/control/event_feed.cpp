@@ -35,6 +35,11 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
     snapshot.cause = state->cause;
     if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it again
   }
+  if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data);
+      raised != nullptr && raised->changed_state) {
+    snapshot.last_fault = raised->fault;
+    snapshot.last_fault_at = event.at;
+  }
   if (const auto* stiffness = std::get_if<Event::StiffnessScaled>(&event.data))
     snapshot.stiffness_scale = stiffness->scale;
   if (description.name == "proxy_initialization" &&
@@ -49,8 +54,8 @@ std::span<const EventRow> feed_events() {
       {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "A fault was raised. fault: name, message and cure; value: its measured size, or 0; recording: the "
-       "flight "
-       "recording of the ticks before it, if one was kept."},
+       "flight recording of the ticks before it, if one was kept. A fault that changes no state is published "
+       "once in 60 s; repeats: how often it was raised in between."},
       {"device",
        "A device was connected or disconnected. present: a device is connected; reconnected: one was "
        "connected before."},
@@ -77,11 +82,16 @@ std::span<const EventRow> feed_events() {
 
 EventFeed::EventFeed(ServoLoop& loop)
     : loop_(loop), thread_([this](const std::stop_token& stop) {
+        ThreadGuard guard("event feed");
         while (!stop.stop_requested()) {
-          drain();
+          guard.run([this] { drain(); });
           std::this_thread::sleep_for(kPause);
         }
-        drain();
+        guard.run([this] { drain(); });
+        guard.run([this] {
+          const std::scoped_lock lock(drain_mutex_, mutex_);
+          append_held_back_faults(std::chrono::steady_clock::now());
+        });
       }) {}
 
 EventFeed::~EventFeed() {
@@ -118,20 +128,38 @@ void EventFeed::set_fault_recorder(RecordFault recorded_in) {
 
 void EventFeed::publish(const Event& event) {
   EventDescription description = describe(event);
-  if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data);
-      raised != nullptr && is_severe(raised->fault) && record_fault_) {
-    if (const std::string recording = record_fault_(raised->fault, event.at); !recording.empty()) {
+  if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data)) {
+    if (!raised->changed_state) {
+      const auto repeats = fault_repeats_.admit(raised->fault, event.at);
+      if (!repeats) return;
+      description.fields["repeats"] = *repeats;
+      if (*repeats > 0) description.text += fmt::format("; raised {} more times before", *repeats);
+    }
+    std::string recording;
+    if (is_severe(raised->fault) && record_fault_)
+      record_guard_.run([&] { recording = record_fault_(raised->fault, event.at); });
+    if (!recording.empty()) {
       description.fields["recording"] = recording;
       description.text += "; recorded in " + recording;
     }
   }
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
+  if (std::holds_alternative<Event::StateChanged>(event.data)) append_held_back_faults(event.at);
   const State from = snapshot_.state;
   apply(snapshot_, event, description);
   append(event.at, description.name, description.level, description.text, description.fields);
   if (const auto* state = std::get_if<Event::StateChanged>(&event.data))
     append_device_event(event.at, from, state->state);
+}
+
+/// Publishes how often faults were raised that changed no state. Precondition: drain_mutex_ and mutex_ are
+/// locked.
+void EventFeed::append_held_back_faults(TimePoint at) {
+  for (const auto& [fault, count] : fault_repeats_.take())
+    append(at, "fault", EventLevel::warning,
+           fmt::format("{}: raised {} more times until now, without an effect", fault_row(fault).name, count),
+           {{"fault", fault_json(fault)}, {"value", 0.0}, {"repeats", count}});
 }
 
 /// The states show whether a device came or went, on every kind of link.

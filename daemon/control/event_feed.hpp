@@ -14,8 +14,10 @@
 #include "core/fault.hpp"
 #include "core/state.hpp"
 #include "daemon/control/event_description.hpp"
+#include "daemon/control/fault_repeats.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/servo/event.hpp"
+#include "daemon/thread_guard.hpp"
 
 namespace wrenchd {
 
@@ -33,6 +35,8 @@ struct FeedSnapshot {
   std::uint64_t sequence = 0;  ///< of the last event that is in it; 0: none yet
   State state = State::disconnected;
   Fault cause = Fault::none;
+  Fault last_fault = Fault::none;  ///< newest fault that changed the state; none: there was no such fault
+  TimePoint last_fault_at{};       ///< when last_fault was raised
   std::string proxy_initialization = "unknown";  ///< "searching", "found" or "failed"
   double stiffness_scale = 1.0;                  ///< stable fraction of the configured stiffness, 0 to 1
 };
@@ -87,6 +91,7 @@ class EventFeed {
   void publish(const Event& event);
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
               const Json& fields);
+  void append_held_back_faults(TimePoint at);
   void append_device_event(TimePoint at, State from, State to);
 
   ServoLoop& loop_;
@@ -94,6 +99,8 @@ class EventFeed {
   std::uint64_t dropped_reported_ = 0;  ///< dropped events that were reported
   bool device_was_present_ = false;
   RecordFault record_fault_;
+  FaultRepeats fault_repeats_;                   ///< protected by drain_mutex_
+  ThreadGuard record_guard_{"flight recorder"};  ///< protected by drain_mutex_
 
   mutable std::mutex mutex_;         ///< protects history_, snapshot_ and wake_fd_
   std::deque<StoredEvent> history_;  ///< the last event has the number snapshot_.sequence

@@ -44,18 +44,26 @@ void Lease::heartbeat(TimePoint now) {
 void Lease::arm(TimePoint now) {
   last_heartbeat_ = now;
   armed_ = true;
+  fading_ = false;
   loop_.requests().arm_with_lease();
+}
+
+void Lease::disarm() {
+  fading_ = true;
+  loop_.requests().disarm();
 }
 
 void Lease::client_lost(std::uint64_t client) {
   if (!held_by(client)) return;
-  if (armed_) loop_.requests().client_lost();
-  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " disconnected");
+  const bool needs_force_off = armed_ && !fading_;
+  if (needs_force_off) loop_.requests().client_lost();
+  end(needs_force_off ? EventLevel::warning : EventLevel::info,
+      "lease: " + holder_->identity + " disconnected");
 }
 
 void Lease::check(TimePoint now) {
   if (!holder_ || now - last_heartbeat_ <= kHeartbeatTimeout) return;
-  if (armed_) loop_.requests().client_lost();
+  if (armed_ && !fading_) loop_.requests().client_lost();
   end(EventLevel::warning, "lease: " + holder_->identity + " sends no heartbeat any more");
 }
 
@@ -65,7 +73,7 @@ TimePoint Lease::next_check_at() const noexcept {
 
 void Lease::end(EventLevel level, const std::string& text) {
   holder_.reset();
-  armed_ = false;
+  armed_ = fading_ = false;
   feed_.emit("lease", level, text, holder_json(holder_));
 }
 

@@ -39,6 +39,9 @@ class Lease {
   void heartbeat(TimePoint now);
   /// The holder arms the loop. Counts as a heartbeat.
   void arm(TimePoint now);
+  /// Disarms the loop, no matter who armed it. The lease keeps its holder, which may leave from now on
+  /// without a fault: the force fades anyway.
+  void disarm();
   /// The connection of this client has ended. If the client holds the lease, the lease ends, and the loop
   /// releases the hand if the client armed it.
   void client_lost(std::uint64_t client);
@@ -58,6 +61,7 @@ class Lease {
   std::optional<Holder> holder_;
   TimePoint last_heartbeat_{};
   bool armed_ = false;
+  bool fading_ = false;  ///< the loop was disarmed on request since the holder armed it
 };
 
 }  // namespace wrenchd

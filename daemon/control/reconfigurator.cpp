@@ -11,8 +11,10 @@
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/scene_text.hpp"
 #include "config/setting_table.hpp"
 #include "core/finite.hpp"
+#include "daemon/control/scene_cost.hpp"
 
 namespace wrenchd {
 namespace {
@@ -116,7 +118,8 @@ Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> sc
       proxy_search_mode_(proxy_search_mode),
       loader_(std::move(loader)),
       contacts_(config_.settings.rendering.contacts),
-      names_{0, names_of(*scene_)} {}
+      present_(std::make_shared<const PresentScene>(
+          PresentScene{config_.scene, contents(config_.scene.file), names_of(*scene_), 0})) {}
 
 Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene) const {
   MeshLoader loader = loader_;
@@ -147,28 +150,32 @@ std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& setti
 }
 
 void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings& settings,
-                           SceneSettings scene, std::shared_ptr<const Scene> built) {
+                           SceneSettings scene, std::string text, std::shared_ptr<const Scene> built) {
   config_.settings = settings;
   contacts_.store(settings.rendering.contacts);
   config_.scene = std::move(scene);
   scene_ = std::move(built);
   rendering_id_ = rendering->id();
   checksum_ = rendering->checksum();
+  auto present = std::make_shared<const PresentScene>(
+      PresentScene{config_.scene, std::move(text), names_of(*scene_), rendering_id_});
   {
-    const std::lock_guard names_lock(names_mutex_);
-    names_ = {rendering_id_, names_of(*scene_)};
+    const std::lock_guard present_lock(present_mutex_);
+    present_ = std::move(present);
   }
   loop_.requests().renderings().offer(std::move(rendering));
 }
 
 void Reconfigurator::replace_scene(const std::filesystem::path& file) {
   const std::lock_guard lock(mutex_);
-  SceneSettings scene = load_scene(file);
+  std::string text = read_config_text(file);
+  SceneSettings scene = load_scene(read_toml_text(text, file), file);
+  check_scene_cost(scene, config_.scene);
   auto scene_built = build_starting_scene(scene).scene;
   Settings settings = config_.settings;
   settings.scene = file;
   auto rendering = build_rendering(settings, scene_built);
-  offer(std::move(rendering), settings, std::move(scene), std::move(scene_built));
+  offer(std::move(rendering), settings, std::move(scene), std::move(text), std::move(scene_built));
 }
 
 std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source) {
@@ -176,6 +183,7 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
   SceneSettings scene = config_.scene;
   const std::size_t half_spaces = scene.half_spaces.size();
   add_obstacle(obstacle, source, scene);
+  check_scene_cost(scene, config_.scene);
   const bool is_half_space = scene.half_spaces.size() > half_spaces;
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
@@ -183,7 +191,8 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
   auto scene_built = build_scene(scene).scene;
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
   auto rendering = build_rendering(config_.settings, scene_built);
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
+  std::string text = scene_text(scene, scene_time_s());
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
   return name;
 }
 
@@ -196,7 +205,8 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
   auto scene_built = build_scene(scene).scene;
   auto rendering = build_rendering(config_.settings, scene_built);
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
+  std::string text = scene_text(scene, scene_time_s());
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
 }
 
 /// Waits until the loop has taken the last rendering and finished its crossfade. Otherwise an obstacle could
@@ -253,7 +263,8 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
   mesh->scheduled = {begin, X_begin, motion};
   auto scene_built = std::make_shared<const Scene>(*scene_, scene.meshes);
   auto rendering = build_rendering(config_.settings, scene_built);
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
+  std::string text = scene_text(scene, scene_time_s());
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
 }
 
 void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesystem::path& source) {
@@ -261,7 +272,7 @@ void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesyste
   Settings settings = config_.settings;
   change_rendering(changes, source, settings);
   auto rendering = build_rendering(settings, scene_);
-  offer(std::move(rendering), settings, config_.scene, scene_);
+  offer(std::move(rendering), settings, config_.scene, present_scene()->text, scene_);
 }
 
 void Reconfigurator::set_workspace(const WorkspaceRequest& request) {
@@ -373,10 +384,12 @@ bool Reconfigurator::is_profile_changed(const DeviceSettings& device) const {
 /// Builds the scene if its name or one of its files has changed since the last reload.
 Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& scene) {
   std::string fingerprint = files_fingerprint(scene);
-  if (fingerprint == scene_fingerprint_) return {false, std::move(fingerprint), config_.scene, {scene_, {}}};
+  if (fingerprint == scene_fingerprint_)
+    return {false, std::move(fingerprint), config_.scene, present_scene()->text, {scene_, {}}};
   SceneSettings settings = scene;
+  std::string text = contents(scene.file);
   BuiltScene built = build_starting_scene(settings);
-  return {true, std::move(fingerprint), std::move(settings), std::move(built)};
+  return {true, std::move(fingerprint), std::move(settings), std::move(text), std::move(built)};
 }
 
 ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
@@ -400,7 +413,8 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   file_settings_ = settings.from_files;
   scene_fingerprint_ = scene.fingerprint;
   if (rendering)
-    offer(std::move(rendering), settings.present, std::move(scene.settings), std::move(scene.built.scene));
+    offer(std::move(rendering), settings.present, std::move(scene.settings), std::move(scene.text),
+          std::move(scene.built.scene));
   return {settings.applied, settings.not_applied, scene.built.mesh_warnings};
 }
 
@@ -409,9 +423,9 @@ Settings Reconfigurator::settings() const {
   return config_.settings;
 }
 
-SceneSettings Reconfigurator::scene() const {
-  const std::lock_guard lock(mutex_);
-  return config_.scene;
+std::shared_ptr<const Reconfigurator::PresentScene> Reconfigurator::present_scene() const {
+  const std::lock_guard present_lock(present_mutex_);
+  return present_;
 }
 
 WorkspaceRequest Reconfigurator::workspace() const {
@@ -425,8 +439,8 @@ Reconfigurator::CurrentRendering Reconfigurator::current_rendering() const {
 }
 
 Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
-  const std::lock_guard names_lock(names_mutex_);
-  return names_;
+  const auto present = present_scene();
+  return {present->rendering_id, present->obstacle_names};
 }
 
 Reconfigurator::SceneView Reconfigurator::scene_view() {

@@ -86,7 +86,14 @@ class Reconfigurator {
   // --- Present values ---
 
   Settings settings() const;
-  SceneSettings scene() const;
+  /// The scene that was offered to the loop last. Returns at once, even while a change is being built.
+  struct PresentScene {
+    SceneSettings settings;
+    std::string text;                         ///< scene file with this content
+    std::vector<std::string> obstacle_names;  ///< indexed by obstacle number
+    std::uint32_t rendering_id;               ///< rendering that contains the scene
+  };
+  std::shared_ptr<const PresentScene> present_scene() const;
   /// What detects the contacts of the rendering that was offered last.
   ContactBackend contacts() const noexcept { return contacts_.load(); }
   WorkspaceRequest workspace() const;
@@ -113,7 +120,7 @@ class Reconfigurator {
     std::uint32_t rendering_id;  ///< rendering that contains the obstacles
     std::vector<std::string> names;
   };
-  /// Returns at once, even while a change is being built.
+  /// Returns at once, as present_scene().
   ObstacleNames obstacle_names() const;
 
   static constexpr double kMoveDelay_s = 0.200;
@@ -138,6 +145,7 @@ class Reconfigurator {
     bool changed;             ///< True if the name or a file of the scene has changed since the last reload.
     std::string fingerprint;  ///< files_fingerprint() of the scene.
     SceneSettings settings;
+    std::string text;  ///< Scene file with this content.
     BuiltScene built;
   };
 
@@ -147,14 +155,14 @@ class Reconfigurator {
   BuiltScene build_starting_scene(SceneSettings& scene);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
   void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
-             std::shared_ptr<const Scene> built);
+             std::string text, std::shared_ptr<const Scene> built);
   void set_workspace(const WorkspaceRequest& request);
   LocalModelSet other_models(std::uint32_t id);
   ReloadedSettings reload_settings(const Settings& file) const;
   bool is_profile_changed(const DeviceSettings& device) const;
   ReloadedScene reload_scene(const SceneSettings& scene);
 
-  mutable std::mutex mutex_;       ///< protects all members but contacts_ and names_
+  mutable std::mutex mutex_;       ///< protects all members but contacts_ and present_
   RunConfig config_;               ///< present values
   Settings file_settings_;         ///< values that came from files; a client may have changed config_ since
   std::string profile_text_;       ///< text of the profile at the start
@@ -169,8 +177,8 @@ class Reconfigurator {
   LocalModelSet models_;
   std::atomic<ContactBackend> contacts_;
 
-  mutable std::mutex names_mutex_;  ///< protects names_
-  ObstacleNames names_;
+  mutable std::mutex present_mutex_;  ///< protects present_; never held while a scene is built
+  std::shared_ptr<const PresentScene> present_;
 };
 
 }  // namespace wrenchd

@@ -75,7 +75,8 @@ class GeometryCache {
 };
 
 Json scene_json(const Reconfigurator& reconfigurator) {
-  const SceneSettings scene = reconfigurator.scene();
+  const auto present = reconfigurator.present_scene();
+  const SceneSettings& scene = present->settings;
   const auto kind = [](BodyKind one) { return one == BodyKind::solid ? "solid" : "surface"; };
   Json obstacles = Json::array();
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
@@ -97,7 +98,7 @@ Json scene_json(const Reconfigurator& reconfigurator) {
             {"scale", scene.tool.scale},
             {"mass", scene.tool.mass_kg}}},
           {"obstacles", obstacles},
-          {"rendering_id", reconfigurator.current_rendering().id}};
+          {"rendering_id", present->rendering_id}};
 }
 
 std::uint32_t id_of(const Json& params) {

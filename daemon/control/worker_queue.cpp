@@ -3,6 +3,8 @@
 
 #include <pthread.h>
 
+#include "daemon/thread_guard.hpp"
+
 namespace wrenchd {
 
 WorkerQueue::WorkerQueue() : thread_([this](const std::stop_token& stop) { run(stop); }) {
@@ -25,6 +27,7 @@ bool WorkerQueue::post(std::function<void()> task) {
 }
 
 void WorkerQueue::run(const std::stop_token& stop) {
+  ThreadGuard guard("worker of slow requests");
   while (true) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, stop, [this] { return !queue_.empty(); });
@@ -32,7 +35,7 @@ void WorkerQueue::run(const std::stop_token& stop) {
     const std::function<void()> task = std::move(queue_.front());
     queue_.pop_front();
     lock.unlock();
-    task();
+    guard.run(task);
   }
 }
 

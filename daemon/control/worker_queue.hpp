@@ -9,8 +9,8 @@
 
 namespace wrenchd {
 
-/// Runs tasks in order on a thread of its own, so that the control thread does not block. A task must not
-/// throw: an exception ends the process. Not RT-safe: allocates.
+/// Runs tasks in order on a thread of its own, so that the control thread does not block. An exception of
+/// a task is logged. Not RT-safe: allocates.
 class WorkerQueue {
  public:
   WorkerQueue();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <regex>
 #include <tuple>
 #include <vector>
 
@@ -12,6 +13,7 @@
 
 #include "config/calibration_store.hpp"
 #include "config/toml_file.hpp"
+#include "core/fault.hpp"
 
 namespace wrenchd {
 namespace {
@@ -131,13 +133,21 @@ fs::path flight_path(const fs::path& directory, std::time_t utc, std::string_vie
   return file;
 }
 
+bool is_flight_name(const std::string& name) {
+  static const std::regex form = [] {
+    std::string faults;
+    for (const FaultRow& row : fault_rows()) faults += (faults.empty() ? "" : "|") + std::string(row.name);
+    return std::regex(kFlight + ("[0-9]{8}T[0-9]{6}Z-(" + faults) + ")(-[0-9]+)?\\.h5");
+  }();
+  return std::regex_match(name, form);
+}
+
 void prune_flights(const fs::path& directory, std::size_t most) {
   std::vector<fs::path> flights;
   std::error_code error;
   for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
-    if (name.starts_with(kFlight) && name.ends_with(".h5") && at->is_regular_file(error))
-      flights.push_back(at->path());
+    if (is_flight_name(name) && at->is_regular_file(error)) flights.push_back(at->path());
   }
   std::sort(flights.begin(), flights.end());  // the names sort by time
   for (std::size_t i = 0; i + most < flights.size(); ++i) fs::remove(flights[i], error);

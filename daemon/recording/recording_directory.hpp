@@ -51,7 +51,11 @@ OwnedFd open_recording(const std::filesystem::path& directory, const std::string
 /// Returns an unused path for a file of the flight recorder: "flight-20261122T141501Z-overspeed.h5".
 std::filesystem::path flight_path(const std::filesystem::path& directory, std::time_t utc,
                                   std::string_view fault);
-/// Removes the oldest files of the flight recorder until at most `most` are left. Keeps all other files.
+/// Returns true if a file name has the form that flight_path() gives: "flight-20261122T141501Z-overspeed.h5",
+/// with the name of a fault, and a number if several have the same time and fault.
+bool is_flight_name(const std::string& name);
+/// Removes the oldest files of the flight recorder until at most `most` are left. Keeps all other files,
+/// also those whose name only begins with "flight-".
 void prune_flights(const std::filesystem::path& directory, std::size_t most);
 
 }  // namespace wrenchd

@@ -3,12 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <ctime>
 #include <type_traits>
 
+#include <fcntl.h>
 #include <hdf5.h>
+#include <sys/file.h>
 
+#include "daemon/control/owned_fd.hpp"
 #include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
@@ -108,8 +112,10 @@ class Handle {
   Close close_;
 };
 
-/// Stops HDF5 from printing its error stack. RecordingError carries the message instead.
-void silence_hdf5() {
+/// Stops HDF5 from printing its error stack. RecordingError carries the message instead. The exit handler of
+/// HDF5 is off: it tries to close a file again that a full disk did not let it close, and crashes.
+void set_up_hdf5() {
+  [[maybe_unused]] static const herr_t first_call = H5dont_atexit();
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
@@ -328,7 +334,7 @@ struct RecordingWriter::File {
 };
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
-  silence_hdf5();
+  set_up_hdf5();
   std::error_code ignored;
   if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
     throw RecordingError(file.string() +
@@ -355,7 +361,8 @@ void RecordingWriter::append(std::span<const TickRecord> records) {
   append(records, {}, {});
 }
 
-/// Writes the contacts first, so that a row of /ticks never refers to a missing row of /contacts.
+/// Passes the contacts to the operating system first, so that a row of /ticks never refers to a row of
+/// /contacts that is missing, whenever the disk is full or the process dies.
 void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
                              std::span<const Touch> contacts) {
   const hsize_t first = file_->contact_rows;
@@ -368,6 +375,7 @@ void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const 
     file_->rows[i].contact_count = ranges[i].count;
   }
   file_->append(file_->contacts, file_->contact_row, file_->contact_rows, contacts.data(), contacts.size());
+  if (!contacts.empty() && H5Dflush(file_->contacts) < 0) file_->fail();
   file_->append(file_->ticks, file_->tick_row, file_->tick_rows, file_->rows.data(), ticks.size());
 }
 
@@ -556,15 +564,37 @@ bool is_unwritten(const TickRow& row) {
   return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
 }
 
+/// Returns true if all contacts of a tick were written. A row that was allocated but not written reads as
+/// zeros; a contact has a normal of unit length.
+bool has_its_contacts(const TickRow& row, const std::vector<Touch>& contacts) {
+  if (row.first_contact > contacts.size() || row.contact_count > contacts.size() - row.first_contact)
+    return false;
+  const auto first = contacts.begin() + static_cast<std::ptrdiff_t>(row.first_contact);
+  return std::none_of(first, first + row.contact_count, [](const Touch& contact) {
+    const auto* const bytes = reinterpret_cast<const unsigned char*>(&contact);
+    return std::all_of(bytes, bytes + sizeof contact, [](unsigned char byte) { return byte == 0; });
+  });
+}
+
+/// Returns true if another process has locked the file. HDF5 locks each file that it writes.
+bool is_locked(const std::filesystem::path& file) {
+  const OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  return fd && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+}
+
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& file) {
-  silence_hdf5();
+  set_up_hdf5();
   std::error_code error;
   const std::uint64_t bytes = std::filesystem::file_size(file, error);
   if (error) throw RecordingError(file.string() + ": does not exist; name a recording of wrenchd");
   const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   const OpenFile open_file{file, id, bytes};
+  if (!id.ok() && is_locked(file))
+    open_file.reject(
+        "is still being written, or another program has locked it; end the recording with 'wrenchctl record "
+        "stop', or wait for the other program, and try again");
   if (!id.ok())
     open_file.reject(H5Fis_hdf5(file.c_str()) > 0 ? "is truncated or damaged; use a complete copy"
                                                   : "is not an HDF5 file; name a recording of wrenchd");
@@ -573,12 +603,12 @@ Recording read_recording(const std::filesystem::path& file) {
   recording.header = read_header(open_file);
   std::vector<TickRow> rows = read_table<TickRow>(open_file, tick_table());
   recording.contacts = read_table<Touch>(open_file, contact_table());
-  while (rows.size() > 1 && is_unwritten(rows.back())) rows.pop_back();
+  while (rows.size() > 1 && (is_unwritten(rows.back()) || !has_its_contacts(rows.back(), recording.contacts)))
+    rows.pop_back();
   recording.ticks.reserve(rows.size());
   recording.contact_ranges.reserve(rows.size());
-  const std::uint64_t contacts = recording.contacts.size();
   for (const TickRow& row : rows) {
-    const bool valid = row.first_contact <= contacts && row.contact_count <= contacts - row.first_contact;
+    const bool valid = has_its_contacts(row, recording.contacts);
     recording.ticks.push_back(row.tick);
     recording.contact_ranges.push_back(valid ? ContactRange{row.first_contact, row.contact_count}
                                              : ContactRange{});

@@ -53,27 +53,42 @@ Recordings::Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pa
     feed_.set_fault_recorder([this](Fault fault, TimePoint at) { return begin_flight(fault, at); });
   collector_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record take");
-    for (; !stop.stop_requested(); std::this_thread::sleep_for(kCollectPeriod)) collect_ticks();
+    ThreadGuard guard("recorder of ticks");
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(kCollectPeriod))
+      guard.run([this] { collect_ticks(); });
   });
   writer_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record write");
+    ThreadGuard guard("writer of recordings");
     for (; !stop.stop_requested(); std::this_thread::sleep_for(kWritePeriod))
-      while (write(false) && !stop.stop_requested()) {
-      }
+      guard.run([&] {
+        while (write(false) && !stop.stop_requested()) {
+        }
+      });
   });
 }
 
 Recordings::~Recordings() {
+  close();
+}
+
+void Recordings::close() noexcept {
   feed_.set_fault_recorder({});
   for (std::jthread* thread : {&collector_, &writer_})
     if (thread->joinable()) {
       thread->request_stop();
       thread->join();
     }
-  collect_ticks();
-  while (write_flight(true)) {
-  }
-  stop();
+  close_guard_.run([this] { collect_ticks(); });
+  close_guard_.run([this] {
+    while (write_flight(true)) {
+    }
+  });
+  close_guard_.run([this] {
+    stop();
+    const std::scoped_lock lock(write_mutex_);
+    closed_ = true;
+  });
 }
 
 std::filesystem::path Recordings::start(const std::string& requested, bool anywhere) {
@@ -85,18 +100,28 @@ std::filesystem::path Recordings::start(const std::string& requested, bool anywh
 }
 
 void Recordings::start_file(const std::filesystem::path& file) {
-  begin(file, std::filesystem::absolute(file).parent_path());
+  // The working directory may be removed while the recording runs.
+  const std::filesystem::path given = std::filesystem::absolute(file);
+  const std::filesystem::path absolute =
+      std::filesystem::weakly_canonical(given.parent_path()) / given.filename();
+  begin(absolute, absolute.parent_path());
 }
 
 void Recordings::begin(const std::filesystem::path& file, const std::filesystem::path& directory) {
+  if (is_flight_name(file.filename().string()))
+    throw RecordingError(file.string() +
+                         ": has the name of a file of the flight recorder, which removes its old files; "
+                         "choose another name");
   const RecordingHeader header = runtime_.recording_header();
   collect_ticks();
   const std::scoped_lock lock(write_mutex_);
+  if (closed_) throw RecordingError(file.string() + ": no recording can start, because the daemon ends");
   if (running_)
     throw RecordingError(running_->file().string() + ": a recording is already running; stop it first");
   std::error_code ignored;
   if (std::filesystem::is_directory(directory, ignored)) check_free_space(directory, settings_);
   running_ = std::make_unique<Recorder>(history_, file, header, history_.stored_range().end);
+  running_directory_ = directory;
   missed_at_start_ = missed_total_.load();
   {
     const std::scoped_lock status(status_mutex_);
@@ -114,7 +139,7 @@ std::optional<Recordings::Summary> Recordings::stop() {
   try {
     while (running_ && running_->write_next(history_.stored_range().end, true)) {
     }
-  } catch (const RecordingError& error) {
+  } catch (const std::exception& error) {
     fail(error.what());
     return {};
   }
@@ -226,7 +251,7 @@ bool Recordings::write_running(bool rest) {
     const bool more = running_->write_next(history_.stored_range().end, rest);
     publish();
     return more;
-  } catch (const RecordingError& error) {
+  } catch (const std::exception& error) {
     fail(error.what());
   }
   return false;
@@ -238,8 +263,8 @@ void Recordings::check_disk_space() {
   const std::scoped_lock lock(write_mutex_);
   if (!running_) return;
   try {
-    check_free_space(std::filesystem::absolute(running_->file()).parent_path(), settings_);
-  } catch (const RecordingError& error) {
+    check_free_space(running_directory_, settings_);
+  } catch (const std::exception& error) {
     fail(error.what());
   }
 }
@@ -254,7 +279,9 @@ std::string Recordings::begin_flight(Fault fault, TimePoint at) {
   Flight flight;
   flight.file = flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name);
   flight.fault = fault;
-  flight.from_ns = (at - from_seconds(flight_s_)).time_since_epoch().count();
+  // The number is taken now: until the writer begins, ticks may leave the history, and then they are counted.
+  flight.first = history_.first_at_or_after((at - from_seconds(flight_s_)).time_since_epoch().count());
+  flight.missed_before = missed_total_.load();
   flight.until_ns = (at + kAfterFault).time_since_epoch().count();
   flight.requested_at = std::chrono::steady_clock::now();
   flight_ = std::move(flight);
@@ -275,16 +302,15 @@ bool Recordings::write_flight(bool rest) {
       check_free_space(directory_, settings_);
       prune_flights(directory_, static_cast<std::size_t>(settings_.flights_kept - 1));
       const RecordingHeader header = runtime_.recording_header();
-      const std::uint64_t first = history_.first_at_or_after(flight.from_ns);
       flight.end = history_.first_at_or_after(flight.until_ns + 1);
-      auto recorder = std::make_unique<Recorder>(history_, flight.file, header, first);
+      auto recorder = std::make_unique<Recorder>(history_, flight.file, header, flight.first);
       status.lock();
       flight.recorder = std::move(recorder);
       status.unlock();
     }
     if (flight.recorder->write_next(flight.end, true)) return true;
     end_flight({});
-  } catch (const RecordingError& error) {
+  } catch (const std::exception& error) {
     end_flight(error.what());
   }
   return false;
@@ -294,6 +320,8 @@ void Recordings::end_flight(const std::string& why) {
   const std::filesystem::path file = flight_->file;
   const Fault fault = flight_->fault;
   const std::uint64_t ticks = flight_->recorder ? flight_->recorder->written() : 0;
+  const std::uint64_t lost =
+      flight_->recorder ? flight_->recorder->lost() + missed_total_.load() - flight_->missed_before : 0;
   if (flight_->recorder && !why.empty()) {  // a reader would take an incomplete file for a complete one
     flight_->recorder.reset();
     std::error_code ignored;
@@ -309,10 +337,12 @@ void Recordings::end_flight(const std::string& why) {
   }
   const std::string name(fault_row(fault).name);
   if (why.empty())
-    feed_.emit("recording", EventLevel::info,
-               "flight recorder: the ticks before " + name + " are in " + file.string() + ", " +
-                   std::to_string(ticks) + " ticks",
-               {{"phase", "flight"}, {"file", file.string()}, {"ticks", ticks}, {"fault", name}});
+    feed_.emit(
+        "recording", lost > 0 ? EventLevel::warning : EventLevel::info,
+        "flight recorder: the ticks before " + name + " are in " + file.string() + ", " +
+            std::to_string(ticks) + " ticks" +
+            (lost > 0 ? "; " + std::to_string(lost) + " are missing: the writer fell behind" : ""),
+        {{"phase", "flight"}, {"file", file.string()}, {"ticks", ticks}, {"lost", lost}, {"fault", name}});
   else
     feed_.emit("recording", EventLevel::error,
                "flight recorder: the ticks before " + name + " are lost: " + why,

@@ -18,6 +18,7 @@
 #include "daemon/recording/record_history.hpp"
 #include "daemon/recording/recorder.hpp"
 #include "daemon/recording/recording_directory.hpp"
+#include "daemon/thread_guard.hpp"
 
 namespace wrenchd {
 
@@ -42,10 +43,14 @@ class Recordings {
   /// Precondition: the loop does not run yet. Runtime and feed must outlive this object. Throws
   /// std::system_error.
   Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
-  /// Writes the stored ticks, and closes the files.
+  /// Calls close().
   ~Recordings();
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
+
+  /// Ends the threads, writes the stored ticks, and closes the files. No recording can start any more. Call
+  /// it when the loop has ended. Reports errors as events.
+  void close() noexcept;
 
   /// Starts to write every tick to a file, and returns the file. requested: a name in the recordings
   /// directory; empty: a name with the present time. If `anywhere` is set, an absolute path is permitted too.
@@ -85,8 +90,9 @@ class Recordings {
   struct Flight {
     std::filesystem::path file;
     Fault fault = Fault::none;
-    std::int64_t from_ns = 0;
     std::int64_t until_ns = 0;
+    std::uint64_t first = 0;          ///< number of the first record of the flight
+    std::uint64_t missed_before = 0;  ///< missed_total_ when the fault was raised
     TimePoint requested_at{};
     std::unique_ptr<Recorder> recorder;  ///< null before the writer begins
     std::uint64_t end = 0;               ///< number of the first record after the flight; valid with recorder
@@ -119,15 +125,18 @@ class Recordings {
   std::uint64_t missed_ = 0;       ///< records that were overwritten before they were collected
   StateRecord record_;
 
-  std::mutex write_mutex_;  ///< protects running_ and missed_at_start_
+  std::mutex write_mutex_;  ///< protects the members up to missed_at_start_
+  bool closed_ = false;     ///< no recording can start any more
   std::unique_ptr<Recorder> running_;
-  std::uint64_t missed_at_start_ = 0;  ///< missed_total_ at the start of the running recording
+  std::filesystem::path running_directory_;  ///< directory of the running recording; an absolute path
+  std::uint64_t missed_at_start_ = 0;        ///< missed_total_ at the start of the running recording
 
   mutable std::mutex status_mutex_;  ///< protects flight_ and status_
   std::optional<Flight> flight_;
   Status status_;
 
   std::atomic<std::uint64_t> missed_total_{0};
+  ThreadGuard close_guard_{"recordings"};
   std::jthread collector_, writer_;  ///< last members: they use the members above
 };
 

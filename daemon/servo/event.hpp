@@ -24,7 +24,8 @@ struct Event {
   };
   struct FaultRaised {
     Fault fault;
-    double value;  ///< Measured size of the fault, in SI units; 0 if the fault has no size.
+    double value;               ///< Measured size of the fault, in SI units; 0 if the fault has no size.
+    bool changed_state = true;  ///< True if the fault led to another state.
   };
   struct StiffnessScaled {
     double scale;  ///< Share of the configured stiffness that stays passive on this device, below 1.

@@ -17,6 +17,10 @@ LimitSettings OutputStage::set_limits(const LimitSettings& limits, bool armed) n
   settings_ = armed ? tighter(settings_, limits, profile_) : limits;
   limits_.set_limits(settings_, profile_);
   heat_.set_maxima(limits_.max_force_N(), limits_.max_torque_Nm());
+  return effective_limits();
+}
+
+LimitSettings OutputStage::effective_limits() const noexcept {
   LimitSettings effective = settings_;
   effective.max_force_N = limits_.max_force_N();
   effective.max_torque_Nm = limits_.max_torque_Nm();

@@ -22,6 +22,8 @@ class OutputStage {
   /// Changes the limits. While the loop is armed, values looser than those that hold are ignored. Returns the
   /// limits that hold from now on, the profile's included.
   LimitSettings set_limits(const LimitSettings& limits, bool armed) noexcept;
+  /// The limits that hold now, the profile's included.
+  LimitSettings effective_limits() const noexcept;
 
   /// The contact wrench without energy that the contact generates by itself. state: that the supervisor
   /// expects for this tick.

@@ -18,7 +18,9 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       port_(device),
       renderer_(settings, profile, std::move(rendering), requests_.renderings(), telemetry_.events()),
       output_(settings.limits, profile, renderer_.make_guard()),
-      supervisor_(settings, profile, output_.max_force_N(), output_.max_torque_Nm(), telemetry_.events()) {}
+      supervisor_(settings, profile, output_.max_force_N(), output_.max_torque_Nm(), telemetry_.events()) {
+  telemetry_.show_limits(output_.effective_limits());
+}
 
 Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
   TimePoint due = clock.now();
@@ -40,7 +42,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   const Verdict v = supervisor_.judge(s, asked.commands, port_.last(), renderer_.proxy_valid(), t);
   if (v.self_test_passed) output_.set_guard(renderer_.derive_stiffness(t));
   const std::uint32_t changes = renderer_.apply(asked, v, in, t);
-  if (asked.limits) supervisor_.set_limits(output_.set_limits(*asked.limits, v.armed()));
+  if (asked.limits) change_limits(*asked.limits, v.armed());
   if (v.release) return leave(t, asked, in, Written{}, {});
 
   const ContactState c = renderer_.project(s, v, t);  // p, its proxy q, eps
@@ -58,6 +60,12 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   clock_.lap(Stage::write);
   if (w.device_lost()) return leave(t, asked, in, w, ready);
   return finish(t, asked, changes, in, d, a, out, w, ready);
+}
+
+void ServoLoop::change_limits(const LimitSettings& limits, bool armed) noexcept {
+  const LimitSettings effective = output_.set_limits(limits, armed);
+  supervisor_.set_limits(effective);
+  telemetry_.show_limits(effective);
 }
 
 /// Writes down what the tick computed. Returns the fault that changed the state in it.

@@ -58,6 +58,7 @@ class ServoLoop {
                TimePoint ready) noexcept;
   Fault leave(const TickTime& t, const Requests& asked, const DeviceReading& in, const Written& last_write,
               TimePoint ready) noexcept;
+  void change_limits(const LimitSettings& limits, bool armed) noexcept;
   void forget_device() noexcept;
 
   Pacing pacing_;

@@ -130,7 +130,9 @@ Authority Supervisor::authorise(const Demand& demand, const Stabilized& contact,
   const bool testing = authority.state == State::self_test;
   authority.send = !testing || self_test_.sends_commands();
   authority.motors_on = testing ? self_test_.motors_on() : is_driving(authority.state);
-  if (!is_driving(authority.state) && authority.state != State::waiting) watches_.client.stop();
+  // In releasing the force fades already: the client may leave without a fault.
+  const bool armed = is_driving(authority.state) && authority.state != State::releasing;
+  if (!armed && authority.state != State::waiting) watches_.client.stop();
   return authority;
 }
 
@@ -153,7 +155,8 @@ void Supervisor::raise(Fault fault, TimePoint now, double value) noexcept {
   if (fault == Fault::none) return;
   const bool changed = machine_.on(fault);
   if (changed) changed_by_ = fault;
-  if (changed || (previous_faults_ & bit(fault)) == 0) events_.emit(now, Event::FaultRaised{fault, value});
+  if (changed || (previous_faults_ & bit(fault)) == 0)
+    events_.emit(now, Event::FaultRaised{fault, value, changed});
   faults_ |= bit(fault);
 }
 

@@ -108,6 +108,7 @@ TickRecord make_record(const TickResult& tick, const Supervisor& supervisor) noe
 void Telemetry::publish(const TickResult& tick, const Supervisor& supervisor,
                         const Rendering& rendering) noexcept {
   record_ = make_record(tick, supervisor);
+  totals_.add(record_);
   emit_changes(supervisor, tick.demand, tick.time.now);
   if (tick.released) events_.emit(tick.time.now, Event::Released{});
   const ContactState& contact = tick.demand.contact;
@@ -166,6 +167,17 @@ void Telemetry::count_times(const TickTime& time, const StageTimes& stage_ns, Du
   for (std::size_t i = 0; i < kStageCount; ++i) timing_.stage[i].add(Duration(stage_ns[i]));
   timing_.wake_latency.add(time.wake_latency);
   timing_.tick.add(elapsed);
+}
+
+void Telemetry::show_limits(const LimitSettings& limits) noexcept {
+  const std::array<double, 5> values = {limits.max_force_N, limits.max_torque_Nm, limits.force_slew_N_per_s,
+                                        limits.torque_slew_Nm_per_s, limits.soft_start_s};
+  for (std::size_t i = 0; i < values.size(); ++i) limits_[i].store(values[i], std::memory_order_relaxed);
+}
+
+LimitSettings Telemetry::limits() const noexcept {
+  const auto value = [this](std::size_t i) { return limits_[i].load(std::memory_order_relaxed); };
+  return {value(0), value(1), value(2), value(3), value(4)};
 }
 
 void Telemetry::count_overrun(std::uint64_t skipped_ticks) noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 
@@ -11,6 +12,7 @@
 #include "daemon/servo/device_port.hpp"
 #include "daemon/servo/event.hpp"
 #include "daemon/servo/loop_timing.hpp"
+#include "daemon/servo/loop_totals.hpp"
 #include "daemon/servo/rendering.hpp"
 #include "daemon/servo/shared_state.hpp"
 #include "daemon/servo/supervisor.hpp"
@@ -58,6 +60,8 @@ class Telemetry {
   void count_times(const TickTime& time, const StageTimes& stage_ns, Duration elapsed) noexcept;
   /// Counts ticks that were skipped because the one before took too long.
   void count_overrun(std::uint64_t skipped_ticks) noexcept;
+  /// Shows the limits that hold from now on.
+  void show_limits(const LimitSettings& limits) noexcept;
   EventQueue& events() noexcept { return events_; }
 
   // --- readers ---
@@ -76,6 +80,10 @@ class Telemetry {
   std::uint64_t dropped_events() const noexcept { return events_.dropped(); }
   /// Any thread.
   const LoopTiming& timing() const noexcept { return timing_; }
+  /// Totals over all ticks. Any thread.
+  const LoopTotals& totals() const noexcept { return totals_; }
+  /// The limits that hold in the loop now, those of the profile included. Any thread.
+  LimitSettings limits() const noexcept;
   /// The newest record. One thread.
   LatestValue<TickRecord>& latest_record() noexcept { return latest_record_; }
   /// Where the handle was in the last tick with a usable sample. One thread.
@@ -101,7 +109,9 @@ class Telemetry {
   std::atomic<Fault> cause_{Fault::none};
   std::atomic<std::uint32_t> rendering_id_{0};
   std::atomic<bool> crossfading_{false};
+  std::array<std::atomic<double>, 5> limits_{};  ///< Members of LimitSettings in their order.
   LoopTiming timing_;
+  LoopTotals totals_;
   LatestValue<TickRecord> latest_record_;
   LatestValue<HandlePose> handle_pose_;
   HandlePose last_handle_pose_;  ///< Belongs to the reader of handle_pose().

@@ -39,19 +39,23 @@ TEST_CASE("the live line states which wrench a device without motors shows", "[l
              Contains("F +0.00 +0.00 +2.00 N") && Contains("on the tool (no motors)"));
 }
 
-TEST_CASE("the totals contain the largest force and torque and the samples in contact", "[live_line]") {
-  RunTotals totals;
+TEST_CASE("the summary has the totals of the loop: every tick, not samples of them", "[live_line]") {
+  LoopTotals totals;
   TickRecord record = record_in(State::active, Fault::none);
-  add_sample(totals, record);
-  record.contacts = 0;
-  record.F_out = {};
-  record.tick = 99;
-  add_sample(totals, record);
-  CHECK(totals.samples == 2);
-  CHECK(totals.samples_in_contact == 1);
+  totals.add(record);
+  for (int i = 1; i < 100; ++i) {
+    record.now_ns = i * 1'000'000;
+    record.contacts = 0;
+    record.F_out = {};
+    totals.add(record);
+  }
   CHECK(totals.ticks == 100);
-  CHECK(totals.max_force_N == 5.0);
-  CHECK(totals.max_torque_Nm == 0.5);
+  CHECK(totals.ticks_in_contact == 1);
+  CHECK(totals.max_force_sent_N == 5.0);
+  CHECK(totals.max_torque_sent_Nm == 0.5);
+  CHECK_THAT(summary(totals, LoopTiming{}, 0.1),
+             Contains("100 ticks in 0.10 s (1000.0 Hz); in contact in 1 ticks; largest force 5.00 N, torque "
+                      "500.0 mN.m\n"));
 }
 
 }  // namespace

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
 
 #include <catch2/catch.hpp>
 #include <sys/wait.h>
@@ -76,6 +80,108 @@ TEST_CASE("a signal without a target, before and after one, has no effect", "[pr
     std::raise(SIGUSR2);  // the loop does not exist any more
     return unchanged;
   }));
+}
+
+/// An armed loop in virtual time whose hand presses. The records are in memory that child processes share, so
+/// that the test sees what the loop did in a process that a signal has ended.
+struct ArmedRun {
+  VirtualRuntime r;
+  const SharedState& records = r.runtime.enable_shared_state();
+
+  ArmedRun() {
+    r.runtime.loop().requests().arm();
+    for (int i = 0; i < 10000 && !(r.state() == State::active && r.force_N() > 0.1); ++i) r.tick();
+    REQUIRE(r.state() == State::active);
+    REQUIRE(r.force_N() > 0.1);
+  }
+
+  /// Runs `act` with the signal handlers in a child process, in which this thread is the servo thread. If the
+  /// process survives, its loop runs on, and ends if a signal has requested it. Returns the wait status.
+  template <class Act>
+  int in_child(const Act& act) {
+    const pid_t child = fork();
+    if (child == 0) {
+      for (int signal = 1; signal <= SIGSYS; ++signal) std::signal(signal, SIG_DFL);  // not those of Catch
+      const ProcessSignals signals;
+      const SignalTarget target(r.runtime.loop());
+      const ServoThreadMark mark;
+      act();
+      for (int i = 0; i < 500 && r.state() != State::shutdown; ++i) {
+        if (signals.stop_requested()) r.runtime.loop().requests().request(kQuit);
+        r.tick();
+      }
+      _exit(0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return status;
+  }
+  StateRecord newest() const {
+    StateRecord record;
+    REQUIRE(records.read(records.written() - 1, record));
+    return record;
+  }
+  bool released() const {
+    const TickRecord tick = newest().tick;
+    return static_cast<State>(tick.state) == State::shutdown && tick.released == 1 &&
+           tick.motors_commanded == 0 && tick.F_out == TickRecord::Numbers6{};
+  }
+};
+
+TEST_CASE("every signal leaves the loop running, or releases the hand before the process ends",
+          "[process_signals]") {
+  ArmedRun run;
+  int running = 0;
+  for (int signal = 1; signal <= SIGRTMAX; ++signal) {
+    if (signal == SIGKILL || signal == SIGSTOP) continue;  // no process can handle them
+    if (signal > SIGSYS && signal < SIGRTMIN) continue;    // the C library uses them itself
+    INFO("signal " << signal << " (" << strsignal(signal) << ")");
+    const std::uint64_t before = run.records.written();
+    const int status = run.in_child([signal] { std::raise(signal); });
+    REQUIRE(run.records.written() > before);
+    const auto state = static_cast<State>(run.newest().tick.state);
+    const bool survived = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (survived && (state == State::active || state == State::stopped)) {
+      ++running;
+    } else {
+      CHECK((survived || (WIFSIGNALED(status) && WTERMSIG(status) == signal)));
+      CHECK(run.released());
+    }
+  }
+  CHECK(running >= 8);
+}
+
+TEST_CASE("a signal whose default ends the process never does so unless it reports a crash",
+          "[process_signals]") {
+  ArmedRun run;
+  for (const int signal : {SIGPIPE, SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU, SIGHUP}) {
+    INFO("signal " << signal);
+    const int status = run.in_child([signal] { std::raise(signal); });
+    CHECK((WIFEXITED(status) && WEXITSTATUS(status) == 0));
+    CHECK(static_cast<State>(run.newest().tick.state) == State::active);
+  }
+}
+
+TEST_CASE("a crash of another thread lets the servo thread release the hand", "[process_signals]") {
+  ArmedRun run;
+  const int status = run.in_child([&run] {
+    std::thread([] { std::raise(SIGSEGV); }).detach();
+    for (int i = 0; i < 10000; ++i) {  // the process ends while the loop ticks
+      run.r.tick();
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+  });
+  CHECK((WIFSIGNALED(status) && WTERMSIG(status) == SIGSEGV));
+  CHECK(run.released());
+}
+
+TEST_CASE("an exception that nobody handles releases the hand before the process aborts",
+          "[process_signals]") {
+  ArmedRun run;
+  const auto fail = [](const char* text) { throw std::runtime_error(text); };
+  const int status = run.in_child([&fail] { [&fail]() noexcept { fail("an exception of the test"); }(); });
+  CHECK((WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT));
+  CHECK(run.released());
 }
 
 }  // namespace

@@ -122,5 +122,63 @@ TEST_CASE("a late reader gets the number of lost events and all events that rema
   CHECK(pieces == feed.events_since(last - 99, {}, 1 << 24).lines);
 }
 
+TEST_CASE("a fault that changes no state is published once in a minute, with the number of repeats",
+          "[event_feed]") {
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
+  s.run(0.05);
+  s.runtime.loop().requests().stop();
+  s.tick();
+  feed.drain();
+  const auto before = feed.snapshot().sequence;
+  for (int i = 0; i < 50; ++i) {  // a late tick in each second, while the stop is latched
+    s.tick_after(std::chrono::milliseconds(10));
+    for (int tick = 0; tick < 5; ++tick) s.tick();
+    feed.drain();
+  }
+  const auto late = events_of(feed, before + 1, {"fault"});
+  REQUIRE(late.size() == 1);
+  CHECK(late[0]["fault"]["name"] == "tick_late");
+  CHECK(late[0]["repeats"] == 0);
+  s.runtime.loop().requests().acknowledge();
+  s.run(0.1);
+  feed.drain();
+  const auto after = events_of(feed, before + 1, {"fault"});
+  REQUIRE(after.size() == 2);
+  CHECK(after[1]["fault"]["name"] == "tick_late");
+  CHECK(after[1]["repeats"] == 49);
+}
+
+TEST_CASE("the snapshot has the newest fault that changed the state, and its time", "[event_feed]") {
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
+  s.run(0.05);
+  feed.drain();
+  CHECK(feed.snapshot().last_fault == Fault::none);
+  s.runtime.loop().requests().stop();
+  s.tick();
+  const TimePoint stopped_at = s.clock.now();
+  s.runtime.loop().requests().acknowledge();
+  s.run(600.0 / 1000.0);
+  feed.drain();
+  CHECK(feed.snapshot().state == State::disarmed);
+  CHECK(feed.snapshot().last_fault == Fault::stop_requested);
+  CHECK(feed.snapshot().last_fault_at == stopped_at);
+}
+
+TEST_CASE("an error of the flight recorder does not end the feed, and the fault is published",
+          "[event_feed]") {
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
+  feed.set_fault_recorder(
+      [](Fault, TimePoint) -> std::string { throw std::runtime_error("the working directory is gone"); });
+  s.run(0.05);
+  s.runtime.loop().requests().stop();
+  s.tick();
+  feed.drain();
+  REQUIRE(events_of(feed, 1, {"fault"}).size() == 1);
+  CHECK(events_of(feed, 1, {"fault"})[0]["fault"]["name"] == "stop_requested");
+}
+
 }  // namespace
 }  // namespace wrenchd

@@ -132,5 +132,38 @@ TEST_CASE("every change of the lease is an event", "[lease]") {
   CHECK(holders == std::vector<Json>{"A", nullptr, "B", nullptr, "A", nullptr});
 }
 
+TEST_CASE("a holder that has disarmed may leave without a fault, at once and during the fade", "[lease]") {
+  for (const int ticks_of_fade : {0, 1, 40, 300}) {
+    Rig r;
+    r.arm_by(kA);
+    r.lease.disarm();
+    for (int i = 0; i < ticks_of_fade; ++i) r.s.tick();  // without heartbeats
+    r.lease.client_lost(kA.client);
+    CHECK_FALSE(r.lease.holder());
+    FaultSet faults = 0;
+    for (int i = 0; i < 300; ++i) {
+      r.s.tick();
+      faults |= r.s.last.faults;
+    }
+    INFO(ticks_of_fade);
+    CHECK(faults == 0);
+    CHECK(r.s.state() == State::disarmed);
+    r.feed.drain();
+    for (const std::string& line : r.feed.events_since(1, {"fault", "lease"}, 1 << 20).lines)
+      CHECK(Json::parse(line)["params"]["level"] == "info");
+  }
+}
+
+TEST_CASE("a holder that arms again after it has disarmed is watched again", "[lease]") {
+  Rig r;
+  r.arm_by(kA);
+  r.lease.disarm();
+  r.s.run(0.3);
+  r.arm_by(kA);
+  r.lease.client_lost(kA.client);
+  r.s.tick();
+  CHECK(r.s.cause() == Fault::heartbeat_lost);
+}
+
 }  // namespace
 }  // namespace wrenchd

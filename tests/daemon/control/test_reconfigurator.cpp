@@ -152,7 +152,8 @@ TEST_CASE("an added obstacle may have a generated mesh", "[reconfigurator]") {
   s.go_for(1.5);
   CHECK(s.last.rendering_id == 1);
   CHECK(s.last.X_WQ[0] < -0.0009);  // the face of the wall is at 24 mm, the face of the cube at 25 mm
-  CHECK(s.reconfigurator().scene().meshes.back().mesh == "made box 0.02 x 0.2 x 0.2 m, 20000 triangles");
+  CHECK(s.reconfigurator().present_scene()->settings.meshes.back().mesh ==
+        "made box 0.02 x 0.2 x 0.2 m, 20000 triangles");
   const char* unknown = "name = \"pot\"\nmesh = { make = \"teapot\" }";
   CHECK_THROWS_WITH(s.reconfigurator().insert_obstacle(toml(unknown), "request"),
                     Catch::Contains("no generated mesh of kind 'teapot'"));

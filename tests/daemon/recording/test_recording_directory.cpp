@@ -145,3 +145,21 @@ TEST_CASE("flight recordings are named by time and fault, and the oldest are rem
   CHECK(there("flight-plan.txt"));
   prune_flights(files.path() / "none", 2);  // a directory that does not exist is no error
 }
+
+TEST_CASE("only names that the flight recorder gives are removed as flights", "[recording]") {
+  const TemporaryDirectory files;
+  for (const char* mine : {"flight-9.h5", "flight-test.h5", "flight-20261122T141501Z.h5",
+                           "flight-20261122T141501Z-mine.h5", "flight-20261122T141501Z-overspeed-a.h5"}) {
+    CHECK_FALSE(is_flight_name(mine));
+    files.write(mine, "mine");
+  }
+  for (const char* flight :
+       {"flight-20261122T141501Z-overspeed.h5", "flight-20261122T141501Z-overspeed-2.h5"}) {
+    CHECK(is_flight_name(flight));
+    files.write(flight, "flight");
+  }
+  prune_flights(files.path(), 0);
+  std::size_t left = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(files.path())) ++left;
+  CHECK(left == 5);
+}

@@ -8,6 +8,7 @@
 
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/random_values.hpp"
+#include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;
@@ -254,4 +255,33 @@ TEST_CASE("recordings are rejected with the file and the remedy", "[recording]")
   CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("does not exist"));
   std::ofstream(directory.path() / "text.h5") << "not HDF5";
   CHECK_THROWS_WITH(read_recording(directory.path() / "text.h5"), Catch::Contains("is not an HDF5 file"));
+}
+
+TEST_CASE("ticks whose contacts were not written are dropped, and no contact is invented", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RandomValues random(3);
+  Touch written{}, unwritten{};
+  written.normal_W = {0.0, 0.0, 1.0};
+  std::memset(static_cast<void*>(&unwritten), 0, sizeof unwritten);  // what HDF5 reads from a full disk
+  RecordBatch batch;
+  for (int i = 0; i < 20; ++i) {
+    const bool lost = i == 5 || i >= 15;
+    batch.add(random_record(random), std::vector<Touch>(2, lost ? unwritten : written));
+  }
+  { RecordingWriter(file, {}).append(batch); }
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 15);
+  for (std::size_t i = 0; i < 15; ++i) CHECK(recording.contacts_of(i).size() == (i == 5 ? 0 : 2));
+}
+
+TEST_CASE("a recording that is being written, or that another program has locked, is not called damaged",
+          "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RecordingWriter writer(file, {});
+  const ProgramResult result = run_program("wrenchctl", {"replay", file.string()});
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.err, Catch::Contains("is still being written, or another program has locked it") &&
+                             !Catch::Contains("damaged"));
 }

@@ -2,6 +2,8 @@
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
+#include <future>
+#include <stdexcept>
 #include <thread>
 
 #include <catch2/catch.hpp>
@@ -277,4 +279,91 @@ TEST_CASE("recordings contain the ticks up to the end of the loop", "[recording]
     if (entry.path().filename().string().starts_with("flight-"))
       flight = static_cast<State>(read_recording(entry.path()).ticks.back().state) == State::shutdown;
   CHECK(flight);
+}
+
+TEST_CASE("a recording that begins after a change of the scene has the text of the present scene",
+          "[recording]") {
+  const TemporaryDirectory files;
+  RunConfig plan = plan_with(files.path());
+  VirtualRuntime s(plan);
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
+  const auto recorded = [&](const char* name) {
+    const auto file = recordings.start(name, false);
+    s.run(0.01);
+    recordings.stop();
+    return read_recording(file).header;
+  };
+  const std::string cube = "mesh = \"" WRENCHD_SOURCE_DIR "/config/meshes/cube.off\"\nscale = 0.001\n";
+  const std::string other = "# another scene\n[tool]\n" + cube +
+                            "mass = 0.3\n[[obstacle]]\nname = \"post\"\n" + cube +
+                            "position_m = [0.2, 0.0, 0.0]\n";
+  const auto file = files.write("other.toml", other);
+  CHECK(recorded("at_start").scene_file == plan.scene.file);
+  s.runtime.reconfigurator().replace_scene(file);
+  const RecordingHeader loaded = recorded("loaded");
+  CHECK(loaded.scene == other);
+  CHECK(loaded.scene_file == file);
+  files.write("other.toml", "# changed afterwards\n");
+  CHECK(recorded("edited").scene == other);
+  s.run(0.5);
+  s.runtime.reconfigurator().remove_obstacle("post");
+  const RecordingHeader changed = recorded("changed");
+  CHECK_THAT(changed.scene, Contains("as clients of wrenchd have changed it") && !Contains("post"));
+}
+
+TEST_CASE("a header of a recording does not wait while another scene is being built", "[recording]") {
+  const TemporaryDirectory files;
+  VirtualRuntime s(plan_with(files.path()));
+  std::atomic<bool> built{false};
+  std::promise<void> reading, go_on;
+  std::thread builder([&] {
+    try {
+      s.runtime.reconfigurator().reload([&]() -> RunConfig {
+        reading.set_value();
+        go_on.get_future().wait();
+        throw std::invalid_argument("a test needs no configuration");
+      });
+    } catch (const std::invalid_argument&) {
+    }
+    built = true;
+  });
+  reading.get_future().wait();
+  CHECK_FALSE(s.runtime.recording_header().scene.empty());
+  CHECK_FALSE(built);
+  go_on.set_value();
+  builder.join();
+}
+
+TEST_CASE("a name of the flight recorder is rejected for a recording", "[recording]") {
+  const TemporaryDirectory files;
+  VirtualRuntime s(plan_with(files.path()));
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
+  CHECK_THROWS_WITH(recordings.start("flight-20261122T141501Z-overspeed", false),
+                    Contains("has the name of a file of the flight recorder"));
+  CHECK_NOTHROW(recordings.start("flight-9", false));
+}
+
+TEST_CASE("a recording goes on when the working directory is removed", "[recording]") {
+  const TemporaryDirectory files;
+  const auto previous = std::filesystem::current_path();
+  const auto removed = files.path() / "removed";
+  std::filesystem::create_directory(removed);
+  {
+    VirtualRuntime s(plan_with(files.path() / "recordings"));
+    EventFeed feed(s.runtime.loop());
+    Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
+    std::filesystem::current_path(removed);
+    recordings.start_file("../mine.h5");
+    std::filesystem::remove(removed);
+    for (int i = 0; i < 3000; ++i) {
+      s.tick();
+      if (i % 100 == 0) CHECK_NOTHROW(recordings.pump());
+    }
+    recordings.close();
+    CHECK_THROWS_WITH(recordings.start("late", false), Contains("the daemon ends"));
+  }
+  std::filesystem::current_path(previous);
+  CHECK(read_recording(files.path() / "mine.h5").ticks.size() == 3000);
 }

@@ -108,7 +108,11 @@ function showCause(now) {
     const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
     showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.message), cure);
   }
-  if (mode === "live" && cause !== "none" && bad && lastFault?.cause !== cause) lastFault = { cause, t: now.t };
+  // The daemon says when the fault was raised, on the clock of the ticks. The page may have been opened later.
+  if (mode === "live") {
+    const fault = link?.status?.last_fault;
+    lastFault = fault ? { cause: fault.name, t: 1e-9 * fault.time_ns } : null;
+  }
   if (mode === "recording") lastFault = lastFaultAt(now.t);
   if (lastFault) {
     const known = faults[lastFault.cause];

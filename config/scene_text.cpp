@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/scene_text.hpp"
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "config/toml_file.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Returns a basic string of TOML.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (byte < 0x20 || byte == 0x7f) {
+      std::array<char, 8> escaped{};
+      std::snprintf(escaped.data(), escaped.size(), "\\u%04x", byte);
+      out += escaped.data();
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::string array(const Vector3d& v) {
+  return "[" + to_text(v.x()) + ", " + to_text(v.y()) + ", " + to_text(v.z()) + "]";
+}
+
+std::string mesh_line(const std::filesystem::path& mesh, const std::optional<GeneratedMesh>& generated) {
+  if (!generated) {
+    std::error_code error;
+    const std::filesystem::path absolute = std::filesystem::absolute(mesh, error);
+    return "mesh = " + quoted((error ? mesh : absolute.lexically_normal()).string()) + "\n";
+  }
+  std::string text =
+      "mesh = { make = " + quoted(generated->kind) + ", triangles = " + std::to_string(generated->triangles);
+  if (generated->kind == "bumpy" || generated->kind == "boulder")
+    text += ", seed = " + std::to_string(generated->seed);
+  if (generated->kind == "box") text += ", size_m = " + array(generated->size_m);
+  return text + " }\n";
+}
+
+std::string mesh_obstacle(const MeshObstacleSettings& obstacle, double now_s) {
+  Pose X_WM = obstacle.motion.pose_at(obstacle.X_WM, now_s);
+  ObstacleMotion motion = obstacle.motion;
+  if (obstacle.scheduled && now_s >= obstacle.scheduled->start_s) {
+    motion = obstacle.scheduled->motion;
+    X_WM = motion.pose_at(obstacle.scheduled->X_WO, now_s);
+  }
+  std::string text = "\n[[obstacle]]\nname = " + quoted(obstacle.name) + "\n" +
+                     mesh_line(obstacle.mesh, obstacle.generated) + "scale = " + to_text(obstacle.scale) +
+                     "\nposition_m = " + array(X_WM.translation_m) +
+                     "\nrotation_vector_rad = " + array(rotation_vector(X_WM.rotation)) + "\n";
+  if (obstacle.kind == BodyKind::surface) text += "kind = \"surface\"\n";
+  if (!motion.moves() || motion.duration_s > 0.0) return text;
+  text += "velocity_m_per_s = " + array(motion.linear_m_per_s) +
+          "\nangular_velocity_rad_per_s = " + array(motion.angular_rad_per_s) + "\n";
+  if (motion.reverse_after_s > 0.0) text += "reverse_after_s = " + to_text(motion.reverse_after_s) + "\n";
+  return text;
+}
+
+}  // namespace
+
+std::string scene_text(const SceneSettings& scene, double now_s) {
+  std::string text = "# The scene as clients of wrenchd have changed it, at scene time " + to_text(now_s) +
+                     " s.\nsurface_tolerance_m = " + to_text(scene.surface_tolerance_m) + "\n\n[tool]\n" +
+                     mesh_line(scene.tool.mesh, scene.tool.generated) +
+                     "scale = " + to_text(scene.tool.scale) + "\nmass = " + to_text(scene.tool.mass_kg) +
+                     "\n";
+  for (const HalfSpaceSettings& obstacle : scene.half_spaces)
+    text += "\n[[obstacle]]\nname = " + quoted(obstacle.name) +
+            "\nhalf_space = { normal = " + array(obstacle.normal_W) +
+            ", offset = " + to_text(obstacle.offset_m) + " }\n";
+  for (const MeshObstacleSettings& obstacle : scene.meshes) text += mesh_obstacle(obstacle, now_s);
+  return text;
+}
+
+}  // namespace wrenchd
