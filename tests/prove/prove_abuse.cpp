@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -26,6 +28,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <wrenchd/client.hpp>
+#include <wrenchd/state_reader.hpp>
 
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/listening_socket.hpp"
@@ -39,6 +42,9 @@
 // third condition costs the machine as much, so the difference is the daemon's own cost. All conditions run
 // in one recording, so other load affects them equally. Tick durations and wake latencies come from the
 // recording.
+//
+// Two further daemons follow: one whose log and live line nobody reads, and one for each signal, which must
+// run on or release the hand before it ends.
 
 namespace {
 
@@ -225,7 +231,8 @@ class Decoy {
 
 class Daemon {
  public:
-  Daemon(const std::string& program, std::vector<std::string> words, const fs::path& log) {
+  /// log: file for standard error. output: if not negative, standard output and standard error instead.
+  Daemon(const std::string& program, std::vector<std::string> words, const fs::path& log, int output = -1) {
     words.insert(words.begin(), program);
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
@@ -234,6 +241,10 @@ class Daemon {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
                                      0600);
+    if (output >= 0) {
+      posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+      posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
+    }
     const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     if (error != 0) throw std::system_error(error, std::generic_category(), program);
@@ -247,6 +258,17 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   bool lives() const { return ::waitpid(pid_, nullptr, WNOHANG) == 0; }
+  void signal(int number) const { ::kill(pid_, number); }
+  /// Returns true if the process has ended within this time.
+  bool ends_within(std::chrono::milliseconds limit) {
+    for (const auto end = std::chrono::steady_clock::now() + limit; std::chrono::steady_clock::now() < end;
+         std::this_thread::sleep_for(2ms))
+      if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
+        pid_ = -1;
+        return true;
+      }
+    return false;
+  }
   /// Ends the process. Returns its exit code; -1 if a signal ended it.
   int end() {
     ::kill(pid_, SIGTERM);
@@ -311,6 +333,124 @@ class Holder {
   std::jthread thread_;
 };
 
+/// An armed daemon that gets a signal. The memory with its ticks outlives the daemon, so that the last tick
+/// shows whether the hand was released.
+class Signalled {
+ public:
+  Signalled(const std::string& program, const fs::path& directory, int signal)
+      : signal_(signal),
+        socket_(directory / ("signal-" + std::to_string(signal) + ".sock")),
+        daemon_(program, {"--realtime", "off", "--arm", "--control", socket_},
+                directory / ("signal-" + std::to_string(signal) + ".log")) {}
+
+  /// Waits for force, and sends the signal. Returns false if the loop is not armed in time: a busy machine
+  /// raises faults.
+  bool send() try {
+    const auto end = std::chrono::steady_clock::now() + 20s;
+    while (!connected(socket_) && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(5ms);
+    client_.emplace(socket_);
+    reader_.emplace(client_->open_state());
+    while (client_->state() != "active") {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::sleep_for(5ms);
+    }
+    daemon_.signal(signal_);
+    return true;
+  } catch (const ClientError&) {  // the daemon did not open its socket in time
+    return false;
+  }
+  /// Returns whether the daemon still runs, or has released the hand before it ended.
+  bool is_safe() {
+    if (!daemon_.ends_within(1s)) return ++survived, true;
+    TickState newest;
+    try {
+      while (reader_->next(newest, 0ms)) {
+      }
+    } catch (const ClientError&) {  // the daemon has ended
+    }
+    return newest.state() == "shutdown" && newest.integer("released") == 1 &&
+           newest.integer("motors_commanded") == 0;
+  }
+  int signal() const { return signal_; }
+
+  static inline long survived = 0;  ///< daemons that ran on
+
+ private:
+  int signal_;
+  fs::path socket_;
+  Daemon daemon_;
+  std::optional<Client> client_;
+  std::optional<StateReader> reader_;
+};
+
+struct Walk {
+  long signals = 0, survived = 0, not_armed = 0, unreleased = 0;
+};
+
+/// Sends every signal to an armed daemon, a few daemons at a time.
+Walk walk_signals(const std::string& program, const fs::path& directory) {
+  constexpr std::size_t kAtOnce = 4;
+  Walk walk;
+  std::vector<int> all;
+  for (int signal = 1; signal <= SIGRTMAX; ++signal)
+    if (signal != SIGKILL && signal != SIGSTOP && (signal <= SIGSYS || signal >= SIGRTMIN))
+      all.push_back(signal);
+  for (std::size_t begin = 0; begin < all.size(); begin += kAtOnce) {
+    std::vector<std::unique_ptr<Signalled>> some;
+    for (std::size_t i = begin; i < std::min(begin + kAtOnce, all.size()); ++i)
+      some.push_back(std::make_unique<Signalled>(program, directory, all[i]));
+    for (auto& one : some)
+      if (!one->send()) one.reset(), ++walk.not_armed;
+    for (auto& one : some) {
+      if (!one) continue;
+      ++walk.signals;
+      if (one->is_safe()) continue;
+      ++walk.unreleased;
+      std::fprintf(stderr, "prove_abuse: signal %d ended the daemon, and the hand was not released\n",
+                   one->signal());
+    }
+  }
+  walk.survived = Signalled::survived;
+  return walk;
+}
+
+struct StalledReader {
+  double slowest_status_ms = 0.0, stop_ms = 0.0, end_ms = 0.0;
+};
+
+/// Runs a daemon whose standard output and standard error go to a full pipe that nobody reads.
+StalledReader stall_reader(const std::string& program, const fs::path& directory) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "pipe");
+  const OwnedFd read_end(pipe[0]), write_end(pipe[1]);
+  ::fcntl(pipe[1], F_SETFL, O_NONBLOCK);
+  const std::array<char, 4096> bytes{};
+  while (::write(pipe[1], bytes.data(), bytes.size()) > 0) {
+  }
+  ::fcntl(pipe[1], F_SETFL, 0);
+  const fs::path socket = directory / "stalled.sock";
+  Daemon daemon(program, {"--realtime", "off", "--live", "--verbose", "--control", socket},
+                directory / "stalled.log", pipe[1]);
+  for (int i = 0; i < 2000 && !connected(socket); ++i) std::this_thread::sleep_for(5ms);
+  Client client(socket);
+  const auto measure_ms = [](const auto& call) {
+    const auto begin = std::chrono::steady_clock::now();
+    call();
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  };
+  StalledReader result;
+  for (int i = 0; i < 200; ++i) {
+    result.slowest_status_ms = std::max(result.slowest_status_ms, measure_ms([&] { client.status(); }));
+    std::this_thread::sleep_for(5ms);
+  }
+  result.stop_ms = measure_ms([&] { client.stop(); });
+  result.end_ms = measure_ms([&] {
+    daemon.signal(SIGTERM);
+    daemon.ends_within(10s);
+  });
+  return result;
+}
+
 /// The condition of a slice.
 enum Kind : std::size_t { kQuiet, kBusy, kAbused, kKinds };
 
@@ -329,6 +469,9 @@ struct Times {
     return values[static_cast<std::size_t>(at)];
   }
 };
+
+/// Longest time from SIGTERM to the end of the daemon.
+constexpr double kMostEnd_ms = 2000.0;
 
 std::int64_t now_ns() {
   return std::chrono::steady_clock::now().time_since_epoch().count();
@@ -423,6 +566,11 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
+    const StalledReader stalled = stall_reader(program, files.path());
+    if (stalled.end_ms > kMostEnd_ms && violations == 0) test::MachineLoad().throw_if_busy();
+    if (stalled.end_ms > kMostEnd_ms) violation("a stalled reader of the log delays the end of the daemon");
+    const Walk walk = walk_signals(program, files.path());
+    violations += walk.unreleased;
     // The daemon shares the machine, so it may receive a timely heartbeat late. The abusers are idle by now,
     // so the measurement does not include their load.
     if (holder.lost_in_time() > 0) {
@@ -447,6 +595,11 @@ int main(int argc, char** argv) {
                   kNames[kind], tick_us.size(), kNames[kind], Times::quantile(tick_us, 0.5), kNames[kind],
                   Times::quantile(tick_us, 0.999), kNames[kind], Times::quantile(late_us, 0.999));
     }
+    std::printf(
+        " signals %ld survived %ld not_armed %ld unreleased %ld stalled_status_ms %.1f stalled_stop_ms %.1f "
+        "stalled_end_ms %.1f",
+        walk.signals, walk.survived, walk.not_armed, walk.unreleased, stalled.slowest_status_ms,
+        stalled.stop_ms, stalled.end_ms);
     std::printf(
         " slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld violations %ld seed "
         "%llu\n",
