@@ -227,7 +227,7 @@ TEST_CASE("invalid scenes are rejected with location and remedy", "[config]") {
   const std::string mesh = kTool + "[[obstacle]]\nmesh = 'cube.off'\n";
   const std::vector<Bad> table = {
       {"", "1:1", "key 'tool' is missing; it has no default, so state it here"},
-      {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; it has no default"},
+      {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; state it, or 'meshes', here"},
       {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; searched /"},
       {"[tool]\nmesh = '.'", "2:8", "name an OFF, OBJ, STL or PLY file"},
       {"[tool]\nmesh = { make = 'geer' }", "2:17",
@@ -296,7 +296,7 @@ TEST_CASE("invalid scenes are rejected with location and remedy", "[config]") {
        "a half_space cannot move"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nreverse_after_s = 1", "5:19", "a half_space cannot move"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
-       "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
+       "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'meshes', 'half_space'"},
       {kTool + "[[obstacle]]\nname = 'x'", "3:1",
        "key 'obstacle[0].half_space' is missing; state it, or 'mesh', here"},
       {kTool + "[[obstacle]]\nmehs = 'cube.off'", "4:1", "did you mean 'mesh'?"},
