@@ -364,8 +364,8 @@ std::string intersection_text(const SurfaceMesh& mesh, const std::vector<FacePai
                                            : " (" + std::to_string(kMaxIntersections) + " or more in all)");
 }
 
-void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::size_t>& face_of,
-                             MeshReport& report) {
+void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh,
+                             const std::vector<std::size_t>& face_of, MeshReport& report) {
   std::vector<FacePair> pairs;
   PMP::self_intersections(mesh, std::back_inserter(pairs),
                           CGAL::parameters::maximum_number(kMaxIntersections));
@@ -391,15 +391,16 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
     }
   }
   report.self_intersecting = true;
-  const bool between_shells = std::any_of(pairs.begin(), pairs.end(), [&](const FacePair& pair) {
-    return shell[pair.first] != shell[pair.second];
-  });
+  // The parts are one body only if each of them is a solid by itself. A single shell is not checked again.
+  const bool between_shells =
+      std::any_of(shell.begin(), shell.end(), [&](std::size_t number) { return number != shell[0]; }) &&
+      !solid_shells(soup).empty();
   report.defects.push_back(
       intersection_text(mesh, pairs, face_of, "intersect each other") +
       (between_shells
            ? "; unite the parts in the modeller, or give the file as a list of parts, meshes = "
              "[\"FILE\"], which are then one body"
-           : "; the surface passes through itself: use it with kind = \"surface\", or remesh it in the "
+           : "; a shell passes through itself: use the file with kind = \"surface\", or remesh it in the "
              "modeller"));
 }
 
@@ -503,7 +504,7 @@ MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
   SurfaceMesh mesh = surface_mesh(soup);
   const std::vector<std::size_t> face_of = triangulate(soup, mesh, report);
   if (!report.defects.empty()) return report;
-  check_self_intersection(mesh, face_of, report);
+  check_self_intersection(soup, mesh, face_of, report);
   check_volume(mesh, report);
   if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
   return report;

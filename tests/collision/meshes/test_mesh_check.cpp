@@ -288,7 +288,10 @@ TEST_CASE("a fold of one shell is tolerated if it is small, and else rejected wi
   soup.vertices[tip].z() = -1e-5;
   CHECK(check_solid(soup).tolerated.find("overlap") != std::string::npos);
   soup.vertices[tip].z() = -1;
-  check_defect_with(soup, {"intersect each other", "use it with kind = \"surface\""});
+  check_defect_with(soup, {"intersect each other", "use the file with kind = \"surface\""});
+  // A second part does not make the first one a solid, so a list of parts is no remedy.
+  check_defect_with(concatenated(soup, box({1.5, 2, 2}, {4, 4, 4})),
+                    {"use the file with kind = \"surface\""});
 }
 
 TEST_CASE("the shells of a soup are solids of their own, unless one is a cavity") {
