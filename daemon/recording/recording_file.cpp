@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstddef>
 #include <ctime>
 #include <type_traits>
@@ -11,6 +12,9 @@
 #include <fcntl.h>
 #include <hdf5.h>
 #include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "daemon/control/owned_fd.hpp"
 #include "daemon/servo/record_fields.hpp"
@@ -584,8 +588,9 @@ bool is_locked(const std::filesystem::path& file) {
 
 }  // namespace
 
-Recording read_recording(const std::filesystem::path& file) {
-  set_up_hdf5();
+namespace {
+
+Recording read_in_this_process(const std::filesystem::path& file) {
   std::error_code error;
   const std::uint64_t bytes = std::filesystem::file_size(file, error);
   if (error) throw RecordingError(file.string() + ": does not exist; name a recording of wrenchd");
@@ -614,6 +619,48 @@ Recording read_recording(const std::filesystem::path& file) {
                                              : ContactRange{});
   }
   return recording;
+}
+
+/// Processor time after which reading a recording counts as a loop: a fixed part, and a part for each 4 MiB.
+constexpr rlim_t kReading_s = 2;
+constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
+
+/// Returns false if libhdf5 crashes or loops while it reads the file, as it does on some damaged files. A
+/// child process tries it: a crash there harms no other process. The child keeps no signal handler of the
+/// parent.
+bool libhdf5_survives(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uint64_t bytes = std::filesystem::file_size(file, error);
+  if (error) return true;  // the reader says why
+  const pid_t child = ::fork();
+  if (child < 0)
+    throw RecordingError(file.string() + ": cannot be read: no process can be started; try again");
+  if (child == 0) {
+    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::signal(signal, SIG_DFL);
+    const rlimit no_core = {0, 0},
+                 time = {kReading_s + bytes / kBytesPerSecond, kReading_s + bytes / kBytesPerSecond};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    ::setrlimit(RLIMIT_CPU, &time);
+    try {
+      read_in_this_process(file);
+    } catch (const std::exception&) {
+      // The parent meets the same error and reports it.
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& file) {
+  set_up_hdf5();
+  if (!libhdf5_survives(file))
+    throw RecordingError(file.string() + ": is damaged: libhdf5 crashes or loops on it; use a complete copy");
+  return read_in_this_process(file);
 }
 
 }  // namespace wrenchd
