@@ -40,11 +40,23 @@ std::string printable(std::string text, std::size_t longest) {
   return text;
 }
 
+bool has_control_characters(std::string_view text) noexcept {
+  return std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+}
+
 ConfigError::ConfigError(std::vector<Rejection> rejections)
     : std::runtime_error(to_lines(rejections)), rejections_(std::move(rejections)) {}
 
 ConfigError::ConfigError(std::filesystem::path file, SourceLocation place, std::string message)
     : ConfigError(std::vector<Rejection>{{std::move(file), place, std::move(message)}}) {}
+
+std::string ConfigError::without_content() const {
+  std::vector<Rejection> bare = rejections_;
+  for (Rejection& rejection : bare)
+    if (rejection.location.line > 0)
+      rejection.message = "is not valid; run 'wrenchctl check' on the file, which tells those who may read it";
+  return to_lines(bare);
+}
 
 void RejectionList::add(SourceLocation place, std::string message) {
   const std::filesystem::path& file = place.file ? *place.file : file_;

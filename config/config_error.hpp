@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace wrenchd {
@@ -30,6 +31,9 @@ std::string to_text(const Rejection& rejection);
 /// The text as a message may quote it: truncated to `longest` bytes, control characters replaced.
 std::string printable(std::string text, std::size_t longest = 60);
 
+/// True if the text has a control character, such as a line feed. RT-safe.
+bool has_control_characters(std::string_view text) noexcept;
+
 /// A file was rejected. what() has one line per defect, in file order.
 class ConfigError : public std::runtime_error {
  public:
@@ -37,6 +41,11 @@ class ConfigError : public std::runtime_error {
   ConfigError(std::filesystem::path file, SourceLocation place, std::string message);
 
   const std::vector<Rejection>& rejections() const noexcept { return rejections_; }
+
+  /// Returns the message for a reader who may not read the file: each place in the file without the found
+  /// value, which is content of the file. A message about the whole file quotes no content. Not RT-safe:
+  /// allocates.
+  std::string without_content() const;
 
  private:
   std::vector<Rejection> rejections_;

@@ -87,9 +87,10 @@ fs::path parent_of(const std::string& name, const SourceLocation& place, const s
 
 }  // namespace
 
-TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vector<fs::path>* files) {
+TomlNode read_inherited(const fs::path& file, const SearchPath& search, LoadedTexts* texts,
+                        const FileScope& scope) {
   std::vector<fs::path> chain = {file};
-  TomlNode merged = read_toml_file(file);
+  TomlNode merged = read_toml_file(file, scope, texts);
   for (;;) {
     auto& table = std::get<TomlNode::Table>(merged.value);
     TomlEntry* entry = find(table, kKey);
@@ -105,11 +106,11 @@ TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vec
     const fs::path parent = parent_of(*name, place, chain, search);
     std::erase_if(table, [](const TomlEntry& e) { return e.key == kKey; });
     chain.push_back(parent);
-    TomlNode inherited = read_toml_file(parent);
+    TomlNode inherited = read_toml_file(parent, scope, texts);
     set_file(inherited, std::make_shared<const fs::path>(parent));
     merge_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
   }
-  if (files != nullptr) *files = chain;
+  if (texts != nullptr) texts->profile_chain = chain;
   return merged;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "config/search_path.hpp"
+#include "config/toml_file.hpp"
 #include "core/device_profile.hpp"
 
 namespace wrenchd {
@@ -14,6 +15,7 @@ namespace wrenchd {
 struct KnownProfiles {
   std::vector<DeviceProfile> profiles;       ///< in the order of their file names
   std::vector<std::filesystem::path> files;  ///< file of each profile
+  std::vector<LoadedTexts> texts;            ///< texts of each profile and of those that it inherits
   std::vector<std::string> rejected;         ///< for each rejected file its defects with location and remedy
 };
 

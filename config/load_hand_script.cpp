@@ -55,9 +55,9 @@ void read_script(TomlTable& table, HandScript& script) {
 
 }  // namespace
 
-void load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation) {
+void load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation, LoadedTexts* texts) {
   HandScript script;
-  read_toml(file, read_script, script);
+  read_toml_node(file, read_toml_file(file, {}, texts), read_script, script);
   simulation.hand_script = file;
   simulation.hand_repeats = script.repeats;
   simulation.hand_path = std::move(script.path);

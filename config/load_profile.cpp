@@ -237,7 +237,7 @@ void read_match(TomlTable& table, DeviceMatch& match) {
   if (!usb && !by_layout) usb.reject("is missing; name at least one device, as in usb = [\"046d:c626\"]");
   if (usb.is_array() && match.usb.empty() && !by_layout && usb.elements("").empty())
     usb.reject("is empty; name at least one device, as in usb = [\"046d:c626\"]");
-  table.optional("serial").text(match.serial);
+  table.optional("serial").line(match.serial);
   table.optional("only_when_named").boolean(match.only_when_named);
   const TomlValue page = table.optional("usage_page");
   read_id16(page, match.usage_page);
@@ -424,7 +424,11 @@ void read_more_reports(const TomlValue& list, DeviceProfile& p) {
 void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue name = table.mandatory("name");
   if (name.text(p.name) && p.name.empty()) name.reject("must not be empty; status and records show it");
-  table.optional("description").text(p.description);
+  // The name becomes part of udev rules, which the device manager executes as root, and of file names.
+  if (!p.name.empty() && !is_profile_name(p.name))
+    name.reject("'" + printable(p.name) + "' is not a valid name: use at most " +
+                std::to_string(kMaxProfileName_bytes) + " letters, digits, -, _ and dots");
+  table.optional("description").line(p.description);
   table.mandatory("transport")
       .choice(
           p.transport,
@@ -488,9 +492,18 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
 
 }  // namespace
 
-DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search) {
+bool is_profile_name(std::string_view name) noexcept {
+  const auto good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  return !name.empty() && name.size() <= kMaxProfileName_bytes && std::all_of(name.begin(), name.end(), good);
+}
+
+DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search, LoadedTexts* texts,
+                           const FileScope& scope) {
   DeviceProfile profile;
-  read_toml_node(file, read_inherited(file, search), read_profile, profile);
+  read_toml_node(file, read_inherited(file, search, texts, scope), read_profile, profile);
   return profile;
 }
 

@@ -141,7 +141,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
 /// Each obstacle has one shape: half_space or mesh.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
   std::string name = place;
-  table.optional("name").text(name);
+  table.optional("name").line(name);
   const TomlValue mesh = table.optional("mesh");
   const TomlValue half_space = table.mandatory_unless("mesh", "half_space");
   const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
@@ -182,23 +182,58 @@ bool has_name(const SceneSettings& scene, const std::string& name) {
 void read_added(TomlTable& table, SceneSettings& scene) {
   std::string name;
   const TomlValue key = table.optional("name");
-  if (key.text(name) && has_name(scene, name))
+  if (key.line(name) && has_name(scene, name))
     key.reject("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
   for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
     if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
   read_obstacle(table, scene, name);
 }
 
+const TomlEntry* find(const TomlNode& table, const std::string& key) {
+  const auto* entries = std::get_if<TomlNode::Table>(&table.value);
+  if (entries == nullptr) return nullptr;
+  for (const TomlEntry& entry : *entries)
+    if (entry.key == key) return &entry;
+  return nullptr;
+}
+
+/// Rejects a body whose mesh file is outside the scope, before the file is looked for: whether a file outside
+/// exists is not told.
+void require_mesh_in_scope(const TomlNode& body, const fs::path& source, const fs::path& directory,
+                           const FileScope& scope) {
+  const TomlEntry* const mesh = find(body, "mesh");
+  const auto* const name = mesh == nullptr ? nullptr : std::get_if<std::string>(&mesh->node.value);
+  if (name == nullptr || scope.includes(directory / *name)) return;
+  throw ConfigError(source, {},
+                    "the mesh '" + printable(*name) + "' is outside the directories that you may use: " +
+                        scope.text() + "; only administrators may name other files");
+}
+
+void require_meshes_in_scope(const TomlNode& tree, const fs::path& file, const FileScope& scope) {
+  if (!scope.is_limited()) return;
+  if (const TomlEntry* const tool = find(tree, "tool"))
+    require_mesh_in_scope(tool->node, file, file.parent_path(), scope);
+  const TomlEntry* const obstacles = find(tree, "obstacle");
+  const auto* const list =
+      obstacles == nullptr ? nullptr : std::get_if<TomlNode::Array>(&obstacles->node.value);
+  if (list == nullptr) return;
+  for (const TomlNode& obstacle : *list) require_mesh_in_scope(obstacle, file, file.parent_path(), scope);
+}
+
 }  // namespace
 
-void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene) {
+void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene,
+                  const FileScope& scope) {
+  if (scope.is_limited()) require_mesh_in_scope(obstacle, source, scene.file.parent_path(), scope);
   SceneSettings extended = scene;
   read_toml_node(source, obstacle, read_added, extended);
   scene = std::move(extended);
 }
 
-SceneSettings load_scene(const std::filesystem::path& file) {
-  return load_scene(read_toml_file(file), file);
+SceneSettings load_scene(const std::filesystem::path& file, LoadedTexts* texts, const FileScope& scope) {
+  const TomlNode tree = read_toml_file(file, scope, texts);
+  require_meshes_in_scope(tree, file, scope);
+  return load_scene(tree, file);
 }
 
 SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file) {

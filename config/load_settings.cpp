@@ -19,15 +19,16 @@ void change_rendering(const TomlNode& changes, const fs::path& source, Settings&
   settings = std::move(changed);
 }
 
-Settings load_settings(const fs::path& file, const SearchPath& search) {
-  return load_settings(read_toml_file(file), file, search);
+Settings load_settings(const fs::path& file, const SearchPath& search, LoadedTexts* texts) {
+  return load_settings(read_toml_file(file, {}, texts), file, search, texts);
 }
 
-Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search) {
+Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search,
+                       LoadedTexts* texts) {
   Settings settings;
   settings.file = file;
   read_toml_node(file, tree, read_settings, SettingContext{search, file}, settings);
-  load_hand_script(settings.simulation.hand_script, settings.simulation);
+  load_hand_script(settings.simulation.hand_script, settings.simulation, texts);
   return settings;
 }
 

@@ -11,10 +11,13 @@
 namespace wrenchd {
 
 /// Reads wrenchd.toml; manual: config/wrenchd.toml. Resolves the files it names (scene, profile, hand script)
-/// and reads the hand script. Throws ConfigError. Not RT-safe: reads files.
-Settings load_settings(const std::filesystem::path& file, const SearchPath& search);
+/// and reads the hand script. texts: receives the texts of both files, if given. Throws ConfigError. Not
+/// RT-safe: reads files.
+Settings load_settings(const std::filesystem::path& file, const SearchPath& search,
+                       LoadedTexts* texts = nullptr);
 /// Converts settings that were read from `file` before.
-Settings load_settings(const TomlNode& tree, const std::filesystem::path& file, const SearchPath& search);
+Settings load_settings(const TomlNode& tree, const std::filesystem::path& file, const SearchPath& search,
+                       LoadedTexts* texts = nullptr);
 
 /// Applies a table with [rendering] and [wrench], or parts of them; other settings remain. source: for
 /// messages. Throws ConfigError and then changes nothing. Not RT-safe: allocates.

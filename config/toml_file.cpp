@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <string_view>
 
@@ -16,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The largest shipped file has 8 kB. A file above 1 MiB is a mesh or a recording.
-constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr std::uint64_t kMaxBytes = 1 << 20;
 
 /// wrenchd's formats nest four levels.
 constexpr int kMaxDepth = 16;
@@ -25,30 +24,28 @@ constexpr int kMaxDepth = 16;
 /// with 500,000 dots would overflow the stack. wrenchd's formats need less than a tenth of this limit.
 constexpr std::ptrdiff_t kMaxDotsInLine = 120;
 
-void require_regular_file(const fs::path& file) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) {
-    throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
+/// Returns the text of a file, which is opened once. Throws ConfigError.
+std::string read_text(const fs::path& file, const FileScope& scope) {
+  try {
+    return read_file(file, kMaxBytes, scope);
+  } catch (const FileError& error) {
+    switch (error.reason()) {
+      case FileError::Reason::not_found:
+        throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
+      case FileError::Reason::directory:
+        throw ConfigError(file, {}, "is a directory; name a file in it");
+      case FileError::Reason::not_regular:
+        throw ConfigError(file, {}, "is not a regular file; name a TOML file");
+      case FileError::Reason::too_large:
+        throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
+      case FileError::Reason::unreadable:
+        throw ConfigError(file, {}, std::string(error.what()) + "; check that this user may read it");
+      case FileError::Reason::link:
+      case FileError::Reason::outside:
+        break;
+    }
+    throw ConfigError(file, {}, error.what());
   }
-  if (error) throw ConfigError(file, {}, "cannot be read: " + error.message());
-  if (fs::is_directory(status)) throw ConfigError(file, {}, "is a directory; name a file in it");
-  if (!fs::is_regular_file(status)) throw ConfigError(file, {}, "is not a regular file; name a TOML file");
-}
-
-std::string read_text(const fs::path& file) {
-  require_regular_file(file);
-  std::error_code error;
-  const std::uintmax_t bytes = fs::file_size(file, error);
-  if (bytes > kMaxBytes) {
-    throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw ConfigError(file, {}, "cannot be opened; check that this user may read it");
-  std::string text(static_cast<std::size_t>(bytes), '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return text;
 }
 
 void reject_many_dots(const fs::path& file, std::string_view text) {
@@ -115,8 +112,16 @@ std::string syntax_message(std::string_view description) {
 
 }  // namespace
 
-TomlNode read_toml_file(const fs::path& file) {
-  return read_toml_text(read_text(file), file);
+TomlNode read_toml_file(const fs::path& file, const FileScope& scope, LoadedTexts* texts) {
+  const std::string text = read_text(file, scope);
+  if (texts != nullptr) texts->by_file[file] = text;
+  return read_toml_text(text, file);
+}
+
+const std::string& LoadedTexts::of(const fs::path& file) const {
+  static const std::string none;
+  const auto found = by_file.find(file);
+  return found == by_file.end() ? none : found->second;
 }
 
 TomlNode read_toml_text(const std::string& text, const fs::path& file) {

@@ -106,10 +106,18 @@ bool TomlValue::text(std::string& out) const {
   return true;
 }
 
+bool TomlValue::line(std::string& out) const {
+  std::string line;
+  if (!text(line)) return false;
+  if (has_control_characters(line)) return reject_found("a text of one line, without control characters");
+  out = line;
+  return true;
+}
+
 bool TomlValue::path(std::filesystem::path& out) const {
   std::string name;
   if (!text(name)) return false;
-  if (name.find('\0') != std::string::npos) return reject_found("a file name without a zero byte");
+  if (has_control_characters(name)) return reject_found("a file name without control characters");
   out = name;
   return true;
 }

@@ -56,6 +56,8 @@ class TomlValue {
   bool integer(T& out, Range range) const;  ///< accepts 45.0, rejects 45.5
   bool boolean(bool& out) const;
   bool text(std::string& out) const;
+  /// As text(), and rejects control characters: logs, status and rules show the text in a line.
+  bool line(std::string& out) const;
   bool path(std::filesystem::path& out) const;
   template <typename E>
   bool choice(E& out, std::initializer_list<std::pair<std::string_view, E>> choices) const;

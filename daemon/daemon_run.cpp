@@ -76,7 +76,9 @@ class ReloadThread {
           while (!stop.stop_requested()) {
             try {
               if (context.signals.take_reload_request()) reload_all(runtime, feed, context);
-            } catch (const std::exception&) {  // the event feed has reported the error
+            } catch (const std::exception& error) {
+              // The event of the feed, which every observer receives, quotes nothing. The log does.
+              spdlog::error("reload: {}", error.what());
             }
             std::this_thread::sleep_for(kReloadPeriod);
           }

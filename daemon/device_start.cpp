@@ -31,7 +31,7 @@ bool open_device(Runtime& runtime, DeviceWait& wait, bool at_start, const StopCo
           runtime.open();
           return true;
         } catch (const DeviceNotFound& missing) {
-          report(spdlog::level::info, missing.what(), "; waiting for it");
+          report(spdlog::level::info, to_printable(missing.what()), "; waiting for it");
           wait.log_rejected(missing.rejected_devices());
         } catch (const std::runtime_error& error) {
           if (first_attempt) throw;
@@ -77,6 +77,9 @@ bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWa
         if (choice.selection) {
           config.profile = known.profiles[choice.selection->profile];
           config.settings.device.profile_file = known.files[choice.selection->profile];
+          const LoadedTexts& texts = known.texts[choice.selection->profile];
+          config.texts.by_file.insert(texts.by_file.begin(), texts.by_file.end());
+          config.texts.profile_chain = texts.profile_chain;
           return true;
         }
         if (!reported) {

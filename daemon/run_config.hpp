@@ -2,6 +2,7 @@
 #pragma once
 
 #include "config/settings.hpp"
+#include "config/toml_file.hpp"
 #include "core/device_profile.hpp"
 #include "core/scene_settings.hpp"
 
@@ -12,6 +13,7 @@ struct RunConfig {
   Settings settings;
   DeviceProfile profile;  ///< the name is empty if the connected device decides
   SceneSettings scene;
+  LoadedTexts texts;      ///< texts of the configuration files as they were read
   bool simulated = true;  ///< true: wrenchd simulates a device with this profile; false: a real device
 };
 

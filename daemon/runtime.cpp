@@ -41,7 +41,7 @@ Duration stall_timeout(const ServoSettings& servo) noexcept {
 
 RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search) {
   RunConfig config;
-  config.settings = load_settings(find_file(files.config, search), search);
+  config.settings = load_settings(find_file(files.config, search), search, &config.texts);
   if (!files.scene.empty()) config.settings.scene = find_file(files.scene, search);
   if (!files.profile.empty()) {
     config.settings.device.profile = files.profile;
@@ -50,10 +50,10 @@ RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search)
                                               : find_file(profile_file(files.profile), search);
   }
   if (const auto& file = config.settings.device.profile_file; !file.empty())
-    config.profile = load_profile(file, search);
+    config.profile = load_profile(file, search, &config.texts);
   config.simulated =
       files.simulate || (!config.profile.name.empty() && config.profile.transport == Transport::loopback);
-  config.scene = load_scene(config.settings.scene);
+  config.scene = load_scene(config.settings.scene, &config.texts);
   if (SimulationSettings& simulation = config.settings.simulation; !simulation.playback.empty())
     simulation.playback_path = read_playback(simulation.playback);
   return config;
@@ -84,14 +84,14 @@ Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMo
       clock_(clock),
       scene_(std::make_shared<const Scene>(config_.scene, used)),
       mesh_remarks_(used.changes()),
-      recorded_texts_(read_recorded_texts(config_)),
+      recorded_texts_(recorded_texts(config_)),
       device_(config_.profile, link),
       loop_(config_.settings, config_.profile, device_,
             std::make_unique<Rendering>(
                 0, config_.settings, config_.profile, scene_,
                 make_proxy_initializer(scene_, search_mode, config_.settings.rendering.contacts)),
             clock),
-      reconfigurator_(config_, scene_, loop_, search_mode, fresh) {
+      reconfigurator_(config_, scene_, loop_, search_mode, fresh, used) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());
 }
 
@@ -109,7 +109,10 @@ SharedState& Runtime::enable_shared_state() {
 RecordingHeader Runtime::recording_header() const {
   RecordingHeader header = recorded_texts_;
   header.rate_Hz = tick_rate_Hz(config_);
-  add_meshes(reconfigurator_.scene(), header);
+  const Reconfigurator::SceneInputs scene = reconfigurator_.scene_inputs();
+  header.scene_file = scene.settings.file;
+  header.scene = scene.text;
+  add_meshes(scene.settings, scene.meshes, header);
   set_start_time(clock_, header);
   return header;
 }

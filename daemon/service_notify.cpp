@@ -17,8 +17,10 @@ constexpr auto kPeriod = std::chrono::milliseconds(100);
 /// messages may be late on a busy machine.
 constexpr int kMessagesPerWatchdog = 8;
 
+/// A line feed would start another variable of the service manager's protocol.
 std::string to_one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
   return text;
 }
 
@@ -80,7 +82,7 @@ std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop) {
       break;
     case Phase::running:
       if (!loop) break;  // the loop has just ended
-      status = status_text(*loop, detail_);
+      status = to_one_line(status_text(*loop, detail_));
       ready = ready || (loop->state != State::disconnected && loop->state != State::self_test);
       alive = last_ticks_ != loop->ticks;
       last_ticks_ = loop->ticks;

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
+
+#include "files/opened_file.hpp"
 
 namespace wrenchd {
 namespace {
@@ -16,6 +16,8 @@ constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d}
 constexpr std::array<std::uint8_t, 1> kReady = {0x41};
 constexpr int kMaxHandshakes = 100;
 constexpr std::size_t kBlock = 128;
+/// The chip has less memory. A larger file is not its firmware.
+constexpr std::uint64_t kMaxFirmware_bytes = 1 << 20;
 
 /// With a shorter latency timer the answers of the boot loader to the handshake are lost.
 constexpr std::uint16_t kLoaderLatency_ms = 16;
@@ -110,9 +112,12 @@ void falcon_open(SerialChip& chip, const std::string& firmware_file) {
         "Falcon: it runs no firmware, and none is named; write a profile that inherits falcon, with the file "
         "of "
         "the manufacturer's SDK as firmware in [endpoints]");
-  std::ifstream file(firmware_file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file || bytes.empty())
+  std::string bytes;
+  try {
+    bytes = read_file(firmware_file, kMaxFirmware_bytes);
+  } catch (const FileError&) {  // reported below
+  }
+  if (bytes.empty())
     throw std::runtime_error("Falcon: cannot read the firmware " + firmware_file +
                              "; set the file of the manufacturer's SDK");
   falcon_start(chip, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});

@@ -16,11 +16,12 @@ namespace fs = std::filesystem;
 
 const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"core", {"core"}},
-    {"devices", {"devices", "core"}},
-    {"collision", {"collision", "core"}},
-    {"config", {"config", "core"}},
-    {"daemon", {"daemon", "devices", "collision", "config", "core"}},
-    {"tools", {"tools", "daemon", "devices", "collision", "config", "core"}},
+    {"files", {"files"}},
+    {"devices", {"devices", "core", "files"}},
+    {"collision", {"collision", "core", "files"}},
+    {"config", {"config", "core", "files"}},
+    {"daemon", {"daemon", "devices", "collision", "config", "core", "files"}},
+    {"tools", {"tools", "daemon", "devices", "collision", "config", "core", "files"}},
 };
 
 struct Include {

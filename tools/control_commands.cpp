@@ -18,7 +18,7 @@
 #include <wrenchd/client.hpp>
 
 #include "daemon/control/json_rpc.hpp"
-#include "daemon/control/owned_fd.hpp"
+#include "files/owned_fd.hpp"
 #include "tools/output_file.hpp"
 
 namespace wrenchd {

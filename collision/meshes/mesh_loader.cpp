@@ -13,6 +13,7 @@
 #include "collision/meshes/mesh_repair.hpp"
 #include "collision/meshes/mesh_source.hpp"
 #include "collision/meshes/packer.hpp"
+#include "files/sha256.hpp"
 
 namespace wrenchd {
 namespace {
@@ -110,10 +111,21 @@ T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large,
 
 std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind,
                                                    const std::optional<GeneratedMesh>& made) {
-  std::error_code error;
-  const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
-  auto& loaded = loaded_[{error || made ? file : same, kind}];
-  if (!loaded) loaded = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
+  auto& loaded = by_name_[{file, kind}];
+  if (!loaded && !made) {
+    if (const auto known = reusable_.find({file, kind}); known != reusable_.end()) {
+      loaded = known->second;
+      kept_bytes_ += loaded->source ? loaded->source->bytes.size() : 0;
+    }
+  }
+  if (!loaded) {
+    std::error_code error;
+    const std::filesystem::path same = made ? file : std::filesystem::weakly_canonical(file, error);
+    auto& shared = loaded_[{error ? file : same, kind}];
+    if (!shared)
+      shared = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
+    loaded = shared;
+  }
   const std::string begin = loaded->file.string() + ": ";
   for (const std::string& change : loaded->repairs) add_once(changes_, begin + change);
   if (kind == BodyKind::surface)
@@ -136,7 +148,7 @@ LoadedMesh MeshLoader::repair_and_check(PolygonSoup soup, const std::filesystem:
 }
 
 LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
-  MeshSource source = read_mesh_source(file);
+  MeshSource source = read_mesh_source(file, scope_);
   const std::size_t size = source.bytes.size();
   const bool large = size >= kLargeMeshBytes;
   if (progress_ && large)
@@ -145,7 +157,27 @@ LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   LoadedMesh loaded = cached<LoadedMesh>({"mesh", extension, body_kind_name(kind), source.bytes}, large,
                                          [&] { return repair_and_check(parse_mesh(source), file, kind); });
   loaded.file = file;
+  auto bytes = std::make_shared<MeshBytes>();
+  bytes->sha256 = sha256_hex(source.bytes);
+  bytes->size_bytes = size;
+  if (size <= kMaxKept_bytes - std::min(kMaxKept_bytes, kept_bytes_)) {
+    bytes->bytes = std::move(source.bytes);
+    kept_bytes_ += size;
+  }
+  loaded.source = std::move(bytes);
   return loaded;
+}
+
+void MeshLoader::reuse(const MeshLoader& other, const std::filesystem::path& except) {
+  for (const auto& [key, mesh] : other.by_name_)
+    if (key.first != except && mesh) reusable_[key] = mesh;
+}
+
+std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>> MeshLoader::sources() const {
+  std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>> sources;
+  for (const auto& [key, mesh] : by_name_)
+    if (mesh && mesh->source) sources[key.first] = mesh->source;
+  return sources;
 }
 
 /// A generated mesh is checked as a file is, because some dimensions may yield walls that are too thin.

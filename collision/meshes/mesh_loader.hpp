@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -18,12 +19,21 @@
 #include "collision/meshes/mesh_size.hpp"
 #include "core/convex_body.hpp"
 #include "core/triangle_mesh.hpp"
+#include "files/opened_file.hpp"
 
 namespace wrenchd {
+
+/// The bytes from which a mesh was loaded. A recording contains them, whatever the file contains later.
+struct MeshBytes {
+  std::string sha256;  ///< SHA-256 of the file, in hexadecimal
+  std::uint64_t size_bytes = 0;
+  std::string bytes;  ///< content of the file; empty if the loader did not keep it
+};
 
 /// A mesh that was read from a file, repaired and checked, or a mesh that was generated and checked.
 struct LoadedMesh {
   std::filesystem::path file;
+  std::shared_ptr<const MeshBytes> source;  ///< null for a generated mesh
   TriangleMesh mesh;                 ///< in the units of the file
   std::vector<std::string> repairs;  ///< one sentence for each kind of repair (mesh_repair.hpp)
 };
@@ -40,11 +50,22 @@ class MeshLoader {
   /// uses the cache.
   static constexpr std::size_t kLargeMeshTriangles = 50'000;
   static constexpr std::size_t kLargeMeshBytes = 50 * kLargeMeshTriangles;
+  /// Largest total size of the file contents that a loader keeps [bytes]. Of the remaining files it keeps the
+  /// SHA-256 only.
+  static constexpr std::size_t kMaxKept_bytes = std::size_t{32} << 20;
 
   MeshLoader() : MeshLoader({}, {}) {}  ///< no cache, no progress reports
   /// cache: directory of the cache; empty: no cache. progress: receives "FILE: ...".
   MeshLoader(std::filesystem::path cache, Progress progress)
       : cache_(std::move(cache)), progress_(std::move(progress)) {}
+
+  /// Limits the files that load() may read. Does not concern meshes that reuse() has taken over.
+  void limit_to(FileScope scope) { scope_ = std::move(scope); }
+  /// Takes over the meshes of another loader: load() returns them for the same file name, and does not read
+  /// their files again. except: name of a file that is read again.
+  void reuse(const MeshLoader& other, const std::filesystem::path& except = {});
+  /// The bytes of the mesh files that load() has returned, by file name.
+  std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>> sources() const;
 
   /// Returns the mesh of a file, or a generated mesh if `generated` is given; `file` is then its name
   /// (generated_mesh_name()). Throws MeshError that names the file, the defect, its place and the remedy.
@@ -71,6 +92,8 @@ class MeshLoader {
   const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
+  using Key = std::pair<std::filesystem::path, BodyKind>;
+
   LoadedMesh read(const std::filesystem::path& file, BodyKind kind);
   LoadedMesh make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind);
   LoadedMesh repair_and_check(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const;
@@ -84,7 +107,11 @@ class MeshLoader {
   std::vector<std::string> changes_;
   std::vector<std::string> simplifications_;
   std::vector<std::string> warnings_;
-  std::map<std::pair<std::filesystem::path, BodyKind>, std::shared_ptr<const LoadedMesh>> loaded_;
+  FileScope scope_;
+  std::size_t kept_bytes_ = 0;                               ///< total size of kept file contents
+  std::map<Key, std::shared_ptr<const LoadedMesh>> loaded_;  ///< by canonical name: links share a mesh
+  std::map<Key, std::shared_ptr<const LoadedMesh>> by_name_;   ///< results of load(), by the given name
+  std::map<Key, std::shared_ptr<const LoadedMesh>> reusable_;  ///< meshes of another loader, by the given name
 };
 
 /// Returns why a mesh cannot be used as a body of this kind and how to correct it: "FILE: ...", one line for

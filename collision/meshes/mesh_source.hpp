@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace wrenchd {
@@ -15,7 +16,15 @@ namespace wrenchd {
 /// line for each defect.
 class MeshError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit MeshError(const std::string& message) : MeshError(message, message) {}
+  MeshError(const std::string& message, std::string without_content)
+      : std::runtime_error(message), without_content_(std::move(without_content)) {}
+
+  /// The message for a reader who may not read the file: the same place, without words of the file.
+  const std::string& without_content() const noexcept { return without_content_; }
+
+ private:
+  std::string without_content_;
 };
 
 /// The bytes of a mesh file, and its name for messages.

@@ -12,7 +12,7 @@
 
 #include "daemon/control/event_feed.hpp"
 #include "daemon/control/json_rpc.hpp"
-#include "daemon/control/owned_fd.hpp"
+#include "files/owned_fd.hpp"
 #include "daemon/control/role.hpp"
 
 namespace wrenchd {

@@ -154,7 +154,7 @@ MethodResult list_devices() {
         {{"device", describe(connected[i])},
          {"product", to_printable(connected[i].product_name)},
          {"profile", selected ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
-         {"rejection_reason", choice.rejections[i]}});
+         {"rejection_reason", to_printable(choice.rejections[i])}});
   }
   return Json{{"devices", list}, {"invalid_profiles", known.rejected}};
 }

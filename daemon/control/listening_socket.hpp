@@ -8,7 +8,7 @@
 #include <sys/types.h>
 
 #include "config/settings.hpp"
-#include "daemon/control/owned_fd.hpp"
+#include "files/owned_fd.hpp"
 #include "daemon/control/role.hpp"
 
 namespace wrenchd {

@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/search_path.hpp"
 #include "config/setting_table.hpp"
 #include "core/finite.hpp"
 
@@ -23,13 +22,6 @@ constexpr auto kMaxWait = std::chrono::seconds(2);
 /// Largest gain of a local model. The loop scales the gain further to what is stable.
 constexpr double kMaxModelGain = 1e5;
 constexpr auto kWaitPeriod = std::chrono::milliseconds(5);
-
-std::string contents(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 /// "cube, post, floor"
 std::string names(const SceneSettings& scene) {
@@ -74,9 +66,9 @@ std::vector<std::string> names_of(const Scene& scene) {
   return names;
 }
 
-/// Returns a text that changes if a file of the scene changes.
-std::string files_fingerprint(const SceneSettings& scene) {
-  std::string text = scene.file.string() + '\n' + contents(scene.file);
+/// Returns a text that changes if a file of the scene changes. Reads no file.
+std::string files_fingerprint(const SceneSettings& scene, const LoadedTexts& texts) {
+  std::string text = scene.file.string() + '\n' + texts.of(scene.file);
   const auto add = [&text](const std::filesystem::path& mesh) {
     std::error_code error;
     text += '\n' + mesh.string() + ' ' + std::to_string(std::filesystem::file_size(mesh, error)) + ' ' +
@@ -103,29 +95,31 @@ std::string reason_not_to_apply(const Setting& setting, const Settings& present,
 }  // namespace
 
 Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                               ProxySearchMode proxy_search_mode, MeshLoader loader)
+                               ProxySearchMode proxy_search_mode, MeshLoader fresh, MeshLoader used)
     : config_(std::move(config)),
       file_settings_(config_.settings),
-      profile_text_(contents(config_.settings.device.profile_file)),
-      scene_fingerprint_(files_fingerprint(config_.scene)),
+      scene_fingerprint_(files_fingerprint(config_.scene, config_.texts)),
       scene_(std::move(scene)),
       loop_(loop),
       proxy_search_mode_(proxy_search_mode),
-      loader_(std::move(loader)),
+      fresh_loader_(std::move(fresh)),
+      used_loader_(std::move(used)),
       contacts_(config_.settings.rendering.contacts),
       names_{0, names_of(*scene_)} {}
 
-Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene) const {
-  MeshLoader loader = loader_;
+Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene, MeshLoader loader) const {
   auto built = std::make_shared<const Scene>(scene, loader);
   std::vector<std::string> warnings = loader.changes();
   warnings.insert(warnings.end(), loader.warnings().begin(), loader.warnings().end());
-  return {std::move(built), std::move(warnings)};
+  return {std::move(built), std::move(warnings), std::move(loader)};
 }
 
-/// Builds a scene whose obstacle motions start now, and sets their start times in `scene`.
-Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& scene) {
-  BuiltScene built = build_scene(scene);
+/// Builds a scene whose obstacle motions start now, and sets their start times in `scene`. Reads every mesh.
+Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& scene,
+                                                                const FileScope& scope) {
+  MeshLoader loader = fresh_loader_;
+  loader.limit_to(scope);
+  BuiltScene built = build_scene(scene, std::move(loader));
   start_motions(scene_time_s(), scene);
   if (built.scene->has_moving_obstacles())
     built.scene = std::make_shared<const Scene>(*built.scene, scene.meshes);
@@ -158,29 +152,47 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
   loop_.requests().renderings().offer(std::move(rendering));
 }
 
-void Reconfigurator::replace_scene(const std::filesystem::path& file) {
+FileScope Reconfigurator::client_files() const {
+  std::vector<std::filesystem::path> directories = SearchPath().directories();
   const std::lock_guard lock(mutex_);
-  SceneSettings scene = load_scene(file);
-  auto scene_built = build_starting_scene(scene).scene;
-  Settings settings = config_.settings;
-  settings.scene = file;
-  auto rendering = build_rendering(settings, scene_built);
-  offer(std::move(rendering), settings, std::move(scene), std::move(scene_built));
+  if (!file_settings_.scene.empty())
+    directories.push_back(std::filesystem::absolute(file_settings_.scene).parent_path());
+  return FileScope::beneath(std::move(directories));
 }
 
-std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source) {
+void Reconfigurator::replace_scene(const std::filesystem::path& file, const FileScope& scope) {
+  const std::lock_guard lock(mutex_);
+  LoadedTexts texts;
+  SceneSettings scene = load_scene(file, &texts, scope);
+  BuiltScene built = build_starting_scene(scene, scope);
+  Settings settings = config_.settings;
+  settings.scene = file;
+  auto rendering = build_rendering(settings, built.scene);
+  config_.texts.by_file[file] = texts.of(file);
+  used_loader_ = std::move(built.used);
+  offer(std::move(rendering), settings, std::move(scene), std::move(built.scene));
+}
+
+/// The bodies that are in the scene keep their meshes: their files may have changed, or may be links that
+/// somebody has put there, since they were loaded. The file of the new body is read.
+std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
+                                            const FileScope& scope) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = config_.scene;
   const std::size_t half_spaces = scene.half_spaces.size();
-  add_obstacle(obstacle, source, scene);
+  add_obstacle(obstacle, source, scene, scope);
   const bool is_half_space = scene.half_spaces.size() > half_spaces;
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, now);
-  auto scene_built = build_scene(scene).scene;
+  MeshLoader loader = fresh_loader_;
+  loader.limit_to(scope);
+  loader.reuse(used_loader_, is_half_space ? std::filesystem::path() : scene.meshes.back().mesh);
+  BuiltScene built = build_scene(scene, std::move(loader));
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
-  auto rendering = build_rendering(config_.settings, scene_built);
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
+  auto rendering = build_rendering(config_.settings, built.scene);
+  used_loader_ = std::move(built.used);
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(built.scene));
   return name;
 }
 
@@ -191,9 +203,12 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
     reject_unknown(name, scene);
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
-  auto scene_built = build_scene(scene).scene;
-  auto rendering = build_rendering(config_.settings, scene_built);
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
+  MeshLoader loader = fresh_loader_;
+  loader.reuse(used_loader_);
+  BuiltScene built = build_scene(scene, std::move(loader));
+  auto rendering = build_rendering(config_.settings, built.scene);
+  used_loader_ = std::move(built.used);
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(built.scene));
 }
 
 /// Waits until the loop has taken the last rendering and finished its crossfade. Otherwise an obstacle could
@@ -363,16 +378,20 @@ Reconfigurator::ReloadedSettings Reconfigurator::reload_settings(const Settings&
   return result;
 }
 
-bool Reconfigurator::is_profile_changed(const DeviceSettings& device) const {
-  return device.profile == file_settings_.device.profile && contents(device.profile_file) != profile_text_;
+/// Compares the texts as they were read. Without a profile file the connected device selects the profile.
+bool Reconfigurator::is_profile_changed(const RunConfig& config) const {
+  const std::filesystem::path& file = config.settings.device.profile_file;
+  return config.settings.device.profile == file_settings_.device.profile && !file.empty() &&
+         config.texts.of(file) != config_.texts.of(config_.settings.device.profile_file);
 }
 
 /// Builds the scene if its name or one of its files has changed since the last reload.
-Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& scene) {
-  std::string fingerprint = files_fingerprint(scene);
-  if (fingerprint == scene_fingerprint_) return {false, std::move(fingerprint), config_.scene, {scene_, {}}};
-  SceneSettings settings = scene;
-  BuiltScene built = build_starting_scene(settings);
+Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const RunConfig& config) {
+  std::string fingerprint = files_fingerprint(config.scene, config.texts);
+  if (fingerprint == scene_fingerprint_)
+    return {false, std::move(fingerprint), config_.scene, {scene_, {}, used_loader_}};
+  SceneSettings settings = config.scene;
+  BuiltScene built = build_starting_scene(settings, {});
   return {true, std::move(fingerprint), std::move(settings), std::move(built)};
 }
 
@@ -380,8 +399,8 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const std::lock_guard lock(mutex_);
   const RunConfig config = read();
   ReloadedSettings settings = reload_settings(config.settings);
-  ReloadedScene scene = reload_scene(config.scene);
-  if (is_profile_changed(config.settings.device))
+  ReloadedScene scene = reload_scene(config);
+  if (is_profile_changed(config))
     settings.not_applied.emplace_back("the device profile was changed: requires a restart");
   if (scene.changed) {
     settings.present.scene = settings.from_files.scene = config.settings.scene;
@@ -396,6 +415,10 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   config_.settings = settings.present;
   file_settings_ = settings.from_files;
   scene_fingerprint_ = scene.fingerprint;
+  if (scene.changed) {
+    config_.texts.by_file[scene.settings.file] = config.texts.of(scene.settings.file);
+    used_loader_ = std::move(scene.built.used);
+  }
   if (rendering)
     offer(std::move(rendering), settings.present, std::move(scene.settings), std::move(scene.built.scene));
   return {settings.applied, settings.not_applied, scene.built.mesh_warnings};
@@ -409,6 +432,11 @@ Settings Reconfigurator::settings() const {
 SceneSettings Reconfigurator::scene() const {
   const std::lock_guard lock(mutex_);
   return config_.scene;
+}
+
+Reconfigurator::SceneInputs Reconfigurator::scene_inputs() const {
+  const std::lock_guard lock(mutex_);
+  return {config_.scene, config_.texts.of(config_.scene.file), used_loader_.sources()};
 }
 
 WorkspaceRequest Reconfigurator::workspace() const {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -41,18 +42,25 @@ struct ReloadResult {
 /// seconds.
 class Reconfigurator {
  public:
-  /// config: what the loop runs with. scene: what the loop renders. loader: copied for each reload, so that
-  /// every mesh file is read again. The loop must outlive this object.
+  /// config: what the loop runs with. scene: what the loop renders. fresh: copied for each new scene, so that
+  /// its mesh files are read. used: the loader of `scene`; the meshes of present bodies stay those that were
+  /// loaded, whatever their files contain later. The loop must outlive this object.
   Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                 ProxySearchMode proxy_search_mode, MeshLoader loader);
+                 ProxySearchMode proxy_search_mode, MeshLoader fresh, MeshLoader used);
 
   // --- Scene ---
 
-  /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now.
-  void replace_scene(const std::filesystem::path& file);
-  /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. Returns the
-  /// name of the obstacle.
-  std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source);
+  /// Files that clients may name who may not configure the daemon: those beneath the directories of the search
+  /// path and of the configured scene.
+  FileScope client_files() const;
+
+  /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now. scope: the files that
+  /// the client may name; it includes the meshes of the scene.
+  void replace_scene(const std::filesystem::path& file, const FileScope& scope = {});
+  /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. scope: the files
+  /// that the client may name. Returns the name of the obstacle.
+  std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
+                              const FileScope& scope = {});
   void remove_obstacle(const std::string& name);
   /// Moves a mesh obstacle to a pose of its mesh frame O in the world, on a straight path at constant speed.
   /// The motion starts kMoveDelay_s from now and takes duration_s.
@@ -87,6 +95,13 @@ class Reconfigurator {
 
   Settings settings() const;
   SceneSettings scene() const;
+  /// The inputs of the scene that was offered last: settings, and the bytes that were read from its files.
+  struct SceneInputs {
+    SceneSettings settings;
+    std::string text;  ///< text of the scene file
+    std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>> meshes;  ///< by file name
+  };
+  SceneInputs scene_inputs() const;
   /// What detects the contacts of the rendering that was offered last.
   ContactBackend contacts() const noexcept { return contacts_.load(); }
   WorkspaceRequest workspace() const;
@@ -123,6 +138,7 @@ class Reconfigurator {
   struct BuiltScene {
     std::shared_ptr<const Scene> scene;
     std::vector<std::string> mesh_warnings;
+    MeshLoader used;  ///< the loader of the scene
   };
   /// Settings after a reload, and the keys that the files have changed.
   struct ReloadedSettings {
@@ -143,26 +159,26 @@ class Reconfigurator {
 
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
-  BuiltScene build_scene(const SceneSettings& scene) const;
-  BuiltScene build_starting_scene(SceneSettings& scene);
+  BuiltScene build_scene(const SceneSettings& scene, MeshLoader loader) const;
+  BuiltScene build_starting_scene(SceneSettings& scene, const FileScope& scope);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
   void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
              std::shared_ptr<const Scene> built);
   void set_workspace(const WorkspaceRequest& request);
   LocalModelSet other_models(std::uint32_t id);
   ReloadedSettings reload_settings(const Settings& file) const;
-  bool is_profile_changed(const DeviceSettings& device) const;
-  ReloadedScene reload_scene(const SceneSettings& scene);
+  bool is_profile_changed(const RunConfig& config) const;
+  ReloadedScene reload_scene(const RunConfig& config);
 
   mutable std::mutex mutex_;       ///< protects all members but contacts_ and names_
   RunConfig config_;               ///< present values
   Settings file_settings_;         ///< values that came from files; a client may have changed config_ since
-  std::string profile_text_;       ///< text of the profile at the start
   std::string scene_fingerprint_;  ///< files_fingerprint() of the scene at the last reload
   std::shared_ptr<const Scene> scene_;
   ServoLoop& loop_;
   ProxySearchMode proxy_search_mode_;
-  MeshLoader loader_;
+  MeshLoader fresh_loader_;
+  MeshLoader used_loader_;  ///< loader of scene_: its meshes, and the bytes of their files
   std::uint32_t rendering_id_ = 0;
   std::uint64_t checksum_ = 0;
   WorkspaceRequest workspace_;

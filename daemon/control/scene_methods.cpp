@@ -29,20 +29,44 @@ Json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
+/// Contents that an error message may quote.
+enum class Quotes : std::uint8_t {
+  all,
+  own_request,  ///< configuration errors concern the request itself; no content of mesh files
+  no_file,      ///< no content of any file
+};
+
 /// Calls the function, and turns the errors of the reconfigurator into RpcError.
 template <class Call>
-MethodResult with_rpc_errors(const Call& call) {
+MethodResult with_rpc_errors(const Call& call, Quotes quotes = Quotes::all) {
   try {
     return call();
   } catch (const BusyError& error) {
     throw RpcError(RpcCode::invalid_state, error.what());
   } catch (const ConfigError& error) {
-    throw RpcError(RpcCode::rejected, error.what());
+    throw RpcError(RpcCode::rejected, quotes == Quotes::no_file ? error.without_content() : error.what());
   } catch (const MeshError& error) {
-    throw RpcError(RpcCode::rejected, error.what());
+    throw RpcError(RpcCode::rejected, quotes == Quotes::all ? error.what() : error.without_content());
   } catch (const std::invalid_argument& error) {
     throw RpcError(RpcCode::rejected, error.what());
   }
+}
+
+/// Administrators configure the daemon, so they may name any file.
+FileScope files_of(const Reconfigurator& reconfigurator, const Caller& caller) {
+  return caller.role >= Role::administrator ? FileScope() : reconfigurator.client_files();
+}
+
+/// Returns the scene file of this name. Looks only for names in the scope, so that the answer tells nothing
+/// about other files. Throws ConfigError.
+std::filesystem::path find_scene(const std::filesystem::path& name, const FileScope& scope) {
+  const SearchPath search;
+  for (const std::filesystem::path& place : search.candidates(name))
+    if (!scope.includes(place))
+      throw ConfigError(name, {},
+                        "is outside the directories that you may use: " + scope.text() +
+                            "; only administrators may name other files");
+  return search.require(name);
 }
 
 Json current_rendering(const Reconfigurator& reconfigurator) {
@@ -151,6 +175,13 @@ MethodResult reload_result(const std::function<ReloadResult()>& reload_all) {
   });
 }
 
+/// Returns the message of an error without content of the file that it concerns.
+std::string without_content(const std::exception& error) {
+  if (const auto* config = dynamic_cast<const ConfigError*>(&error)) return config->without_content();
+  if (const auto* mesh = dynamic_cast<const MeshError*>(&error)) return mesh->without_content();
+  return error.what();
+}
+
 }  // namespace
 
 TomlNode toml_of(const Json& json) {
@@ -190,8 +221,10 @@ ReloadResult reload_config(Reconfigurator& reconfigurator, EventFeed& feed,
             {{"applied", result.applied}, {"not_applied", result.not_applied}, {"error", nullptr}});
   return result;
 } catch (const std::exception& error) {
-  feed.emit("reload", EventLevel::error, std::string("reload: rejected, nothing changes: ") + error.what(),
-            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"error", error.what()}});
+  // Every observer receives the event, and an observer may be denied to read the configuration.
+  const std::string told = without_content(error);
+  feed.emit("reload", EventLevel::error, "reload: rejected, nothing changes: " + told,
+            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"error", told}});
   throw;
 }
 
@@ -227,25 +260,30 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
       "Replaces the scene, tool included. The force crosses over without a step when the proxy has a "
       "feasible "
       "pose in the new scene.",
-      [&reconfigurator](const Json& params, const Caller&) {
-        return with_rpc_errors([&] {
-          reconfigurator.replace_scene(SearchPath().require(params["file"].get<std::string>()));
-          return MethodResult(current_rendering(reconfigurator));
-        });
+      [&reconfigurator](const Json& params, const Caller& caller) {
+        return with_rpc_errors(
+            [&] {
+              const FileScope scope = files_of(reconfigurator, caller);
+              reconfigurator.replace_scene(find_scene(params["file"].get<std::string>(), scope), scope);
+              return MethodResult(current_rendering(reconfigurator));
+            },
+            caller.role >= Role::administrator ? Quotes::all : Quotes::no_file);
       },
       true});
   table.add(MethodRow{"scene.add",
                       Role::operator_,
                       {{"obstacle", ParamType::object, true, "the keys of an [[obstacle]] of a scene file"}},
                       "Adds an obstacle. Returns its name, which scene.move and scene.remove use.",
-                      [&reconfigurator](const Json& params, const Caller&) {
-                        return with_rpc_errors([&] {
-                          const std::string name =
-                              reconfigurator.insert_obstacle(toml_of(params["obstacle"]), "scene.add");
-                          Json result = current_rendering(reconfigurator);
-                          result["name"] = name;
-                          return MethodResult(result);
-                        });
+                      [&reconfigurator](const Json& params, const Caller& caller) {
+                        return with_rpc_errors(
+                            [&] {
+                              const std::string name = reconfigurator.insert_obstacle(
+                                  toml_of(params["obstacle"]), "scene.add", files_of(reconfigurator, caller));
+                              Json result = current_rendering(reconfigurator);
+                              result["name"] = name;
+                              return MethodResult(result);
+                            },
+                            caller.role >= Role::administrator ? Quotes::all : Quotes::own_request);
                       },
                       true});
   table.add(MethodRow{"scene.remove",

@@ -2,17 +2,26 @@
 #include "daemon/recording/playback.hpp"
 
 #include <array>
-#include <fstream>
+#include <cstdint>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include <unistd.h>
 
 #include "config/config_error.hpp"
 #include "config/pose_table.hpp"
 #include "config/toml_file.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "files/opened_file.hpp"
 
 namespace wrenchd {
 namespace {
+
+/// Largest file that is looked into. A recording has its own limit.
+constexpr std::uint64_t kMaxFile_bytes = std::uint64_t{1} << 41;
+constexpr std::uint64_t kMaxTable_bytes = std::uint64_t{1} << 30;
 
 bool is_good(const TickRecord& tick) {
   return tick.fresh != 0 && tick.sample_fault == Fault::none && tick.released == 0;
@@ -51,16 +60,21 @@ std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
 
 std::vector<TimedPose> read_playback(const std::filesystem::path& file) {
   constexpr std::string_view kHdf5 = "\x89HDF";
-  std::error_code error;
-  std::ifstream in(file, std::ios::binary);
-  if (!in || !std::filesystem::is_regular_file(file, error))
-    throw PoseTableError(file.string() +
-                         ": cannot be read; name a recording, or a CSV file of poses with times");
-  std::array<char, 4> begin{};
-  in.read(begin.data(), begin.size());
-  if (in.gcount() == 4 && std::string_view(begin.data(), 4) == kHdf5) return of_recording(file);
-  in.clear();
-  in.seekg(0);
+  std::string text;
+  try {
+    const OpenedFile opened(file, kMaxFile_bytes);
+    std::array<char, kHdf5.size()> begin{};
+    const ssize_t got = ::pread(opened.fd(), begin.data(), begin.size(), 0);
+    if (got == static_cast<ssize_t>(begin.size()) && std::string_view(begin.data(), begin.size()) == kHdf5)
+      return of_recording(file);
+    if (opened.size_bytes() > kMaxTable_bytes)
+      throw PoseTableError(file.string() + ": is larger than 1 GiB; name a shorter table of poses");
+    text = opened.read();
+  } catch (const FileError& error) {
+    throw PoseTableError(file.string() + ": cannot be read (" + error.what() +
+                         "); name a recording, or a CSV file of poses with times");
+  }
+  std::istringstream in(std::move(text));
   return read_timed_poses(in, file.string());
 }
 

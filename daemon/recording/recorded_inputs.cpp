@@ -1,63 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording/recorded_inputs.hpp"
 
-#include <array>
 #include <chrono>
 #include <fstream>
-#include <iterator>
-#include <optional>
-#include <sstream>
 
-#include <openssl/evp.h>
 #include <sys/utsname.h>
 
-#include "config/inherited_toml.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
+#include "files/opened_file.hpp"
+#include "files/sha256.hpp"
 
 namespace wrenchd {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns the bytes of a file; nothing if it cannot be read.
-std::optional<std::string> contents(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return {};
-  std::ifstream in(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(in), {}};
-  if (in.bad()) return {};
-  return bytes;
-}
-
-std::string sha256(const std::string& bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
-  unsigned length = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), hash.data(), &length, EVP_sha256(), nullptr) != 1)
-    throw RecordingError("OpenSSL has no SHA-256");
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string text;
-  for (unsigned i = 0; i < length; ++i) {
-    text += kDigits[hash[i] >> 4];
-    text += kDigits[hash[i] & 15];
-  }
-  return text;
-}
-
-/// Returns the profiles that a profile inherits, the nearest first.
-std::vector<fs::path> parents_of(const fs::path& profile) {
-  std::vector<fs::path> chain;
-  try {
-    read_inherited(profile, SearchPath(), &chain);
-  } catch (const ConfigError&) {  // the file has changed since the start; a replay reports the missing parent
-    return {};
-  }
-  chain.erase(chain.begin());
-  return chain;
-}
+/// Largest mesh file that a replay reads from its original path.
+constexpr std::uint64_t kMaxMesh_bytes = std::uint64_t{1} << 30;
 
 const char* word(Realtime realtime) {
   switch (realtime) {
@@ -97,11 +60,15 @@ fs::path mesh_at(const RecordingHeader& header, const std::string& role, const f
     write(file, mesh->bytes);
     return file;
   }
-  const auto bytes = contents(mesh->path);
-  if (!bytes || sha256(*bytes) != mesh->sha256)
-    throw RecordingError(mesh->path.string() + ": " +
-                         (bytes ? "has changed since it was recorded" : "does not exist any more") +
-                         " (SHA-256 " + mesh->sha256 +
+  std::string why;
+  try {
+    if (sha256_hex(read_file(mesh->path, kMaxMesh_bytes)) != mesh->sha256)
+      why = "has changed since it was recorded";
+  } catch (const FileError& error) {
+    why = error.reason() == FileError::Reason::not_found ? "does not exist any more" : error.what();
+  }
+  if (!why.empty())
+    throw RecordingError(mesh->path.string() + ": " + why + " (SHA-256 " + mesh->sha256 +
                          "), and the recording does not contain it; restore the file");
   return mesh->path;
 }
@@ -175,41 +142,45 @@ DeviceProfile profile_of(const RecordingHeader& header, const fs::path& director
     if (parent == nullptr) break;
     put(parent->path, parent->bytes);
   }
-  return load_profile(nearest, SearchPath(places));
+  // A damaged or hostile recording must not name other files of the reader.
+  return load_profile(nearest, SearchPath(places), nullptr, FileScope::beneath({directory}));
 }
 
 }  // namespace
 
-RecordingHeader read_recorded_texts(const RunConfig& config) {
+RecordingHeader recorded_texts(const RunConfig& config) {
   RecordingHeader header;
   header.version = kVersion;
   header.settings_file = config.settings.file;
   header.scene_file = config.scene.file;
   header.profile_file = config.settings.device.profile_file;
-  header.settings = contents(header.settings_file).value_or("");
-  header.scene = contents(header.scene_file).value_or("");
-  header.profile = contents(header.profile_file).value_or("");
-  int number = 0;
-  for (const fs::path& parent : parents_of(header.profile_file))
-    header.files.push_back(
-        {"profile_" + std::to_string(++number), parent, {}, true, contents(parent).value_or("")});
+  header.settings = config.texts.of(header.settings_file);
+  header.scene = config.texts.of(header.scene_file);
+  header.profile = config.texts.of(header.profile_file);
+  const std::vector<fs::path>& chain = config.texts.profile_chain;
+  for (std::size_t i = 1; i < chain.size(); ++i)
+    header.files.push_back({"profile_" + std::to_string(i), chain[i], {}, true, config.texts.of(chain[i])});
   const fs::path& script = config.settings.simulation.hand_script;
-  header.files.push_back({"hand_script", script, {}, true, contents(script).value_or("")});
+  header.files.push_back({"hand_script", script, {}, true, config.texts.of(script)});
   header.realtime = word(config.settings.servo.realtime);
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
   return header;
 }
 
-void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
+void add_meshes(const SceneSettings& scene,
+                const std::map<fs::path, std::shared_ptr<const MeshBytes>>& loaded, RecordingHeader& header) {
   std::size_t inside = 0;
   const auto add = [&](const std::string& role, const fs::path& at) {
-    std::string bytes = contents(at).value_or("");
-    RecordedFile mesh{role, fs::absolute(at).lexically_normal(), sha256(bytes), true, {}};
-    mesh.embedded = inside + bytes.size() <= kMaxEmbeddedMesh_bytes;
+    const auto found = loaded.find(at);
+    if (found == loaded.end()) return;
+    const MeshBytes& source = *found->second;
+    RecordedFile mesh{role, fs::absolute(at).lexically_normal(), source.sha256, true, {}};
+    mesh.embedded =
+        source.bytes.size() == source.size_bytes && inside + source.bytes.size() <= kMaxEmbeddedMesh_bytes;
     if (mesh.embedded) {
-      inside += bytes.size();
-      mesh.bytes = std::move(bytes);
+      inside += source.bytes.size();
+      mesh.bytes = source.bytes;
     }
     header.files.push_back(std::move(mesh));
   };

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <memory>
 
+#include "collision/meshes/mesh_loader.hpp"
 #include "core/clock.hpp"
 #include "core/scene_settings.hpp"
 #include "daemon/recording/recording_file.hpp"
@@ -15,15 +18,17 @@ namespace wrenchd {
 
 /// Total size of the meshes that a recording contains, the tool first. A recording names the remaining meshes
 /// with their SHA-256 only, so that a short recording stays small.
-inline constexpr std::size_t kMaxEmbeddedMesh_bytes = std::size_t{32} << 20;
+inline constexpr std::size_t kMaxEmbeddedMesh_bytes = MeshLoader::kMaxKept_bytes;
 
 /// Returns a header with the versions and the texts of settings, scene, profile with its parents, and hand
-/// script. The text of a file that cannot be read is empty.
-RecordingHeader read_recorded_texts(const RunConfig& config);
+/// script, as they were read for this configuration. Reads no file.
+RecordingHeader recorded_texts(const RunConfig& config);
 
-/// Adds the present mesh files of the scene. Generated meshes need no file: the text of the scene defines
-/// them.
-void add_meshes(const SceneSettings& scene, RecordingHeader& header);
+/// Adds the mesh files of the scene. loaded: the bytes from which its meshes were loaded, by file name.
+/// Generated meshes need no file: the text of the scene defines them. Reads no file.
+void add_meshes(const SceneSettings& scene,
+                const std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>>& loaded,
+                RecordingHeader& header);
 
 /// Sets the start time to now, by `clock` and by UTC.
 void set_start_time(const Clock& clock, RecordingHeader& header);

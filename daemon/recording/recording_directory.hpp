@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "config/settings.hpp"
-#include "daemon/control/owned_fd.hpp"
+#include "files/owned_fd.hpp"
 #include "daemon/recording/recording_file.hpp"
 
 namespace wrenchd {

@@ -4,73 +4,26 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdlib>
 #include <ctime>
-#include <type_traits>
 
 #include <hdf5.h>
 
-#include "daemon/servo/record_fields.hpp"
+#include "daemon/recording/recording_stream.hpp"
+#include "daemon/recording/recording_tables.hpp"
 
 namespace wrenchd {
 namespace {
 
 /// Version of the columns and their meaning. A reader of another version rejects the file.
 constexpr const char* kFormat = "7";
-constexpr hsize_t kChunkContacts = 1024;
 constexpr unsigned kDeflateLevel = 1;
 /// Largest expansion of DEFLATE. A table that claims more rows than its file can hold is damaged.
 constexpr std::uint64_t kMaxExpansion = 1032;
 /// Maximum size of a text or a mesh.
 constexpr hsize_t kMaxBytes = hsize_t{1} << 31;
-
-/// A row of /ticks.
-struct TickRow {
-  TickRecord tick;
-  std::uint64_t first_contact = 0;
-  std::uint32_t contact_count = 0;
-  std::uint32_t padding = 0;
-};
-static_assert(std::is_trivially_copyable_v<TickRow> && std::is_trivially_copyable_v<Touch>);
-
-constexpr std::array kContactRangeFields = {
-    RecordField{"first_contact", FieldType::u64, 1, offsetof(TickRow, first_contact), "1", "",
-                "row of /contacts with the first contact of the tick", ValueNames::none},
-    RecordField{
-        "contact_count", FieldType::u32, 1, offsetof(TickRow, contact_count), "1", "",
-        "rows of /contacts for the tick, at most 16 with the largest multipliers; `contacts` counts all",
-        ValueNames::none},
-};
-
-/// Description of one of the two tables.
-struct TableKind {
-  const char* path;
-  const char* name;  ///< Name in messages and in /fields.
-  std::size_t row_bytes;
-  std::vector<RecordField> fields;
-  hsize_t chunk_rows;
-};
-
-const TableKind& tick_table() {
-  static const TableKind kind = [] {
-    const auto fields = tick_fields();
-    TableKind made{
-        "/ticks", "ticks", sizeof(TickRow), {fields.begin(), fields.end()}, RecordingWriter::kChunkTicks};
-    made.fields.insert(made.fields.end(), kContactRangeFields.begin(), kContactRangeFields.end());
-    return made;
-  }();
-  return kind;
-}
-
-const TableKind& contact_table() {
-  static const TableKind kind = [] {
-    const auto fields = contact_fields();
-    TableKind made{"/contacts", "contacts", sizeof(Touch), {}, kChunkContacts};
-    for (const RecordField& field : fields)
-      if (std::string(field.name) != "padding") made.fields.push_back(field);
-    return made;
-  }();
-  return kind;
-}
+/// Rows of a table that are read together.
+constexpr hsize_t kReadRows = 4096;
 
 hid_t type_of(FieldType type) {
   switch (type) {
@@ -163,7 +116,8 @@ hid_t create_table(hid_t file, const TableKind& table, hid_t row) {
   const hsize_t unlimited = H5S_UNLIMITED;
   const Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
   const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  H5Pset_chunk(layout, 1, &table.chunk_rows);
+  const hsize_t chunk_rows = table.chunk_rows;
+  H5Pset_chunk(layout, 1, &chunk_rows);
   H5Pset_shuffle(layout);
   H5Pset_deflate(layout, kDeflateLevel);
   const hid_t made = H5Dcreate2(file, table.path, row, space, H5P_DEFAULT, layout, H5P_DEFAULT);
@@ -321,13 +275,26 @@ struct RecordingWriter::File {
     if (!grown || H5Dwrite(table, row, in_memory, in_file, H5P_DEFAULT, from) < 0) fail();
     rows_so_far = total;
   }
+  void flush() const {
+    if (H5Fflush(file, H5F_SCOPE_LOCAL) < 0) fail();
+  }
   [[noreturn]] void fail() const {
     throw RecordingError(path.string() +
                          ": the recording cannot be written; check that the disk is connected and not full");
   }
 };
 
+std::mutex& hdf5_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+void initialize_hdf5() {
+  H5open();
+}
+
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
+  const std::scoped_lock lock(hdf5_mutex());
   silence_hdf5();
   std::error_code ignored;
   if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
@@ -346,10 +313,13 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const Record
     throw RecordingError(file.string() + ": the tables cannot be created; check that the disk is not full");
   write_fields(id);
   write_header(id, header);
-  flush();
+  file_->flush();
 }
 
-RecordingWriter::~RecordingWriter() = default;
+RecordingWriter::~RecordingWriter() {
+  const std::scoped_lock lock(hdf5_mutex());
+  file_.reset();
+}
 
 void RecordingWriter::append(std::span<const TickRecord> records) {
   append(records, {}, {});
@@ -358,6 +328,7 @@ void RecordingWriter::append(std::span<const TickRecord> records) {
 /// Writes the contacts first, so that a row of /ticks never refers to a missing row of /contacts.
 void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
                              std::span<const Touch> contacts) {
+  const std::scoped_lock lock(hdf5_mutex());
   const hsize_t first = file_->contact_rows;
   file_->rows.assign(ticks.size(), TickRow{});
   for (std::size_t i = 0; i < ticks.size(); ++i) {
@@ -372,33 +343,102 @@ void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const 
 }
 
 void RecordingWriter::flush() {
-  if (H5Fflush(file_->file, H5F_SCOPE_LOCAL) < 0) file_->fail();
+  const std::scoped_lock lock(hdf5_mutex());
+  file_->flush();
 }
 
 // ------------------------------------------------------------------------------------------------ Reading
 
 namespace {
 
+/// Why the file is rejected: a phrase without the file name.
+class Rejected : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+[[noreturn]] void reject(const std::string& reason) {
+  throw Rejected(reason);
+}
+
+/// An open recording.
+struct OpenRecording {
+  hid_t file;
+  std::uint64_t bytes;  ///< Size of the file.
+};
+
+/// Requires that a name in a group is an object of this file. A link to another place or file would make the
+/// library follow it.
+void require_hard_link(hid_t group, const char* name) {
+  H5L_info_t info{};
+  if (H5Lget_info(group, name, &info, H5P_DEFAULT) < 0) reject("is damaged; use a complete copy");
+  if (info.type != H5L_TYPE_HARD)
+    reject("'" + std::string(name) +
+           "' is a link to another object or file, which a recording never contains; the file was changed, "
+           "take it as it was recorded");
+}
+
+bool has(hid_t group, const char* name) {
+  if (H5Lexists(group, name, H5P_DEFAULT) <= 0) return false;
+  require_hard_link(group, name);
+  return true;
+}
+
+/// Rejects a data set whose content is elsewhere, or that would load a filter from a file.
+void require_plain_storage(hid_t set, const std::string& name) {
+  const Handle layout(H5Dget_create_plist(set), H5Pclose);
+  const H5D_layout_t kind = layout.ok() ? H5Pget_layout(layout) : H5D_LAYOUT_ERROR;
+  if (kind != H5D_CHUNKED && kind != H5D_CONTIGUOUS && kind != H5D_COMPACT)
+    reject("'" + name + "' is not stored in this file, which a recording always is; the file was changed");
+  if (H5Pget_external_count(layout) != 0)
+    reject("'" + name + "' is stored in another file (external storage), which a recording never is; the file "
+                        "was changed, take it as it was recorded");
+  const int filters = H5Pget_nfilters(layout);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(layout, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, nullptr);
+    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE)
+      reject("'" + name + "' has a filter that a recording never has; the file was changed");
+  }
+}
+
+/// Opens a data set of this file. Throws Rejected.
+hid_t open_set(hid_t group, const std::string& name) {
+  require_hard_link(group, name.c_str());
+  const hid_t set = H5Dopen2(group, name.c_str(), H5P_DEFAULT);
+  if (set < 0) reject("'" + name + "' cannot be read; the file is damaged");
+  try {
+    require_plain_storage(set, name);
+  } catch (...) {
+    H5Dclose(set);
+    throw;
+  }
+  return set;
+}
+
 /// Returns the text of an attribute or data set; returns an empty text if there is none.
 template <class Read>
-std::string text_of(const Handle& type, const Read& read) {
+std::string text_of(const OpenRecording& recording, const Handle& type, const Read& read) {
   if (!type.ok() || H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) return {};
   const std::size_t size = H5Tget_size(type);
-  if (size > kMaxBytes) return {};
+  if (size > std::min<std::uint64_t>(kMaxBytes, recording.bytes * kMaxExpansion)) return {};
   std::string text(size, '\0');
   if (read(text.data()) < 0) return {};
   text.resize(std::min(text.size(), text.find('\0')));  // an empty text is stored as one zero byte
   return text;
 }
 
-std::string read_text(hid_t object, const char* name) {
+std::string read_text(const OpenRecording& recording, hid_t object, const char* name) {
+  if (H5Aexists(object, name) <= 0) return {};
   const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
   if (!attribute.ok()) return {};
   const Handle space(H5Aget_space(attribute), H5Sclose);
   if (H5Sget_simple_extent_npoints(space) != 1) return {};
   const Handle type(H5Aget_type(attribute), H5Tclose);
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) <= 0)
-    return text_of(type, [&](char* to) { return H5Aread(attribute, type, to); });
+    return text_of(recording, type, [&](char* to) { return H5Aread(attribute, type, to); });
   char* bytes = nullptr;
   if (H5Aread(attribute, type, &bytes) < 0 || bytes == nullptr) return {};
   const std::string text = bytes;
@@ -408,32 +448,25 @@ std::string read_text(hid_t object, const char* name) {
 
 template <class T>
 T read_number(hid_t object, const char* name, hid_t type, T otherwise) {
+  if (H5Aexists(object, name) <= 0) return otherwise;
   const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
   if (!attribute.ok()) return otherwise;
   const Handle space(H5Aget_space(attribute), H5Sclose);
+  const Handle stored(H5Aget_type(attribute), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(stored);
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT) return otherwise;
   T number = otherwise;
   if (H5Sget_simple_extent_npoints(space) != 1 || H5Aread(attribute, type, &number) < 0) return otherwise;
   return number;
 }
 
-std::string read_config(hid_t set, std::filesystem::path& path) {
+std::string read_config(const OpenRecording& recording, hid_t set) {
   const Handle space(H5Dget_space(set), H5Sclose);
   if (H5Sget_simple_extent_npoints(space) != 1) return {};
   const Handle type(H5Dget_type(set), H5Tclose);
-  path = read_text(set, "file");
-  return text_of(type, [&](char* to) { return H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to); });
+  return text_of(recording, type,
+                 [&](char* to) { return H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to); });
 }
-
-/// An open recording, and how to report an error in it.
-struct OpenFile {
-  const std::filesystem::path& path;
-  hid_t file;
-  std::uint64_t bytes;  ///< Size of the file.
-
-  [[noreturn]] void reject(const std::string& reason) const {
-    throw RecordingError(path.string() + ": " + reason);
-  }
-};
 
 std::vector<std::string> names_in(hid_t group) {
   std::vector<std::string> names;
@@ -447,143 +480,207 @@ std::vector<std::string> names_in(hid_t group) {
   return names;
 }
 
-RecordedFile read_mesh(const OpenFile& open_file, hid_t set, const std::string& role) {
-  RecordedFile mesh{role,
-                    read_text(set, "file"),
-                    read_text(set, "sha256"),
-                    read_number<std::uint8_t>(set, "embedded", H5T_NATIVE_UINT8, 0) != 0,
-                    {}};
+void read_mesh(const OpenRecording& recording, hid_t set, const std::string& role, RecordingEncoder& out) {
+  const auto embedded = read_number<std::uint8_t>(set, "embedded", H5T_NATIVE_UINT8, 0) != 0;
+  out.put(FrameKind::new_file, {});
+  out.put(FrameKind::file_role, role);
+  out.put(FrameKind::file_path, read_text(recording, set, "file"));
+  out.put(FrameKind::file_sha256, read_text(recording, set, "sha256"));
+  out.put(FrameKind::file_embedded, embedded ? std::string_view("\1", 1) : std::string_view("\0", 1));
   const Handle space(H5Dget_space(set), H5Sclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space);
-  if (!mesh.embedded || count <= 0) return mesh;
-  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMaxBytes, open_file.bytes * kMaxExpansion))
-    open_file.reject("the mesh '" + role + "' claims more bytes than the file can hold; the file is damaged");
-  mesh.bytes.resize(static_cast<std::size_t>(count));
-  if (H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data()) < 0)
-    open_file.reject("the mesh '" + role + "' cannot be read; the file is damaged");
-  return mesh;
+  if (!embedded || count <= 0) return;
+  const Handle type(H5Dget_type(set), H5Tclose);
+  if (H5Tget_class(type) != H5T_INTEGER || H5Tget_size(type) != 1)
+    reject("the mesh '" + role + "' does not consist of bytes; the file was changed");
+  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMaxBytes, recording.bytes * kMaxExpansion))
+    reject("the mesh '" + role + "' claims more bytes than the file can hold; the file is damaged");
+  std::string bytes(static_cast<std::size_t>(count), '\0');
+  if (H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) < 0)
+    reject("the mesh '" + role + "' cannot be read; the file is damaged");
+  out.put(FrameKind::file_bytes, bytes);
 }
 
-void read_files(const OpenFile& open_file, RecordingHeader& header) {
-  for (const char* group_path : {"/config", "/meshes"}) {
-    const Handle group(H5Gopen2(open_file.file, group_path, H5P_DEFAULT), H5Gclose);
+void read_files(const OpenRecording& recording, RecordingEncoder& out) {
+  for (const char* group_name : {"config", "meshes"}) {
+    if (!has(recording.file, group_name)) continue;
+    const Handle group(H5Gopen2(recording.file, group_name, H5P_DEFAULT), H5Gclose);
     if (!group.ok()) continue;
     for (const std::string& name : names_in(group)) {
-      const Handle set(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose);
-      if (!set.ok()) continue;
+      const Handle set(open_set(group, name), H5Dclose);
       if (is_mesh(name)) {
-        header.files.push_back(read_mesh(open_file, set, name));
+        read_mesh(recording, set, name, out);
         continue;
       }
-      std::filesystem::path path;
-      std::string text = read_config(set, path);
-      if (name == "settings")
-        header.settings = text, header.settings_file = path;
-      else if (name == "scene")
-        header.scene = text, header.scene_file = path;
-      else if (name == "profile")
-        header.profile = text, header.profile_file = path;
-      else
-        header.files.push_back({name, path, {}, true, text});
+      const std::string path = read_text(recording, set, "file");
+      const std::string text = read_config(recording, set);
+      const auto put = [&](FrameKind of_text, FrameKind of_path) {
+        out.put(of_text, text);
+        out.put(of_path, path);
+      };
+      if (name == "settings") {
+        put(FrameKind::settings, FrameKind::settings_file);
+      } else if (name == "scene") {
+        put(FrameKind::scene, FrameKind::scene_file);
+      } else if (name == "profile") {
+        put(FrameKind::profile, FrameKind::profile_file);
+      } else {
+        out.put(FrameKind::new_file, {});
+        out.put(FrameKind::file_role, name);
+        put(FrameKind::file_bytes, FrameKind::file_path);
+        out.put(FrameKind::file_embedded, std::string_view("\1", 1));
+      }
     }
   }
 }
 
-RecordingHeader read_header(const OpenFile& open_file) {
-  RecordingHeader header;
-  header.version = read_text(open_file.file, "wrenchd_version");
-  header.kernel = read_text(open_file.file, "kernel");
-  header.realtime = read_text(open_file.file, "realtime");
-  header.virtual_time = read_text(open_file.file, "clock") == "virtual";
-  header.rate_Hz = read_number(open_file.file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
-  header.started_ns = read_number<std::int64_t>(open_file.file, "started_ns", H5T_NATIVE_INT64, 0);
-  header.started_unix_ns = read_number<std::int64_t>(open_file.file, "started_unix_ns", H5T_NATIVE_INT64, 0);
-  read_files(open_file, header);
-  return header;
+void read_header(const OpenRecording& recording, RecordingEncoder& out) {
+  const hid_t file = recording.file;
+  out.put(FrameKind::version, read_text(recording, file, "wrenchd_version"));
+  out.put(FrameKind::kernel, read_text(recording, file, "kernel"));
+  out.put(FrameKind::realtime, read_text(recording, file, "realtime"));
+  RecordingFacts facts;
+  facts.virtual_time = read_text(recording, file, "clock") == "virtual" ? 1 : 0;
+  facts.rate_Hz = read_number(file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
+  facts.started_ns = read_number<std::int64_t>(file, "started_ns", H5T_NATIVE_INT64, 0);
+  facts.started_unix_ns = read_number<std::int64_t>(file, "started_unix_ns", H5T_NATIVE_INT64, 0);
+  out.put(facts);
+  read_files(recording, out);
 }
 
 /// Rejects a file of another format before anything is read, because its columns differ in name or meaning.
-void check_format(const OpenFile& open_file) {
-  std::string format = read_text(open_file.file, "format");
-  std::string version = read_text(open_file.file, "wrenchd_version");
+void check_format(const OpenRecording& recording) {
+  std::string format = read_text(recording, recording.file, "format");
+  std::string version = read_text(recording, recording.file, "wrenchd_version");
   if (format.empty()) {  // formats up to 5 have these attributes at the table
-    const Handle table(H5Dopen2(open_file.file, "/ticks", H5P_DEFAULT), H5Dclose);
-    if (!table.ok()) open_file.reject("has no table 'ticks'; name a recording of wrenchd");
-    format = read_text(table, "format");
-    version = read_text(table, "wrenchd_version");
+    if (!has(recording.file, "ticks")) reject("has no table 'ticks'; name a recording of wrenchd");
+    const Handle table(open_set(recording.file, "ticks"), H5Dclose);
+    format = read_text(recording, table, "format");
+    version = read_text(recording, table, "wrenchd_version");
     if (format.empty()) format = "1";
   }
   if (format != kFormat)
-    open_file.reject("was written by wrenchd " + (version.empty() ? "of an unknown version" : version) +
-                     " in recording format " + format + ", and this wrenchd reads format " + kFormat +
-                     "; replay or export it with the version that wrote it");
+    reject("was written by wrenchd " + (version.empty() ? "of an unknown version" : version) +
+           " in recording format " + format + ", and this wrenchd reads format " + kFormat +
+           "; replay or export it with the version that wrote it");
 }
 
-/// Rejects a table that lacks a column.
-void check_columns(const OpenFile& open_file, const TableKind& table, hid_t set) {
+/// Returns true if a column has the class, size and dimension that the writer gives it. Other types would
+/// need conversions, and may refer to other places of the file.
+bool has_type_of(const RecordField& field, hid_t column) {
+  const hid_t element = type_of(field.type);
+  if (field.count == 1)
+    return H5Tget_class(column) == H5Tget_class(element) && H5Tget_size(column) == H5Tget_size(element);
+  if (H5Tget_class(column) != H5T_ARRAY || H5Tget_array_ndims(column) != 1) return false;
+  hsize_t count = 0;
+  if (H5Tget_array_dims2(column, &count) != 1 || count != field.count) return false;
+  const Handle base(H5Tget_super(column), H5Tclose);
+  return H5Tget_class(base) == H5Tget_class(element) && H5Tget_size(base) == H5Tget_size(element);
+}
+
+/// Rejects a table that has other columns than those that the writer makes.
+void check_columns(const TableKind& table, hid_t set) {
   const Handle type(H5Dget_type(set), H5Tclose);
   if (H5Tget_class(type) != H5T_COMPOUND)
-    open_file.reject("table '" + std::string(table.name) + "' has no columns; name a recording of wrenchd");
-  for (const RecordField& field : table.fields)
-    if (H5Tget_member_index(type, field.name) < 0)
-      open_file.reject("column '" + std::string(field.name) + "' of table '" + table.name +
-                       "' is missing; the file was changed, take it as it was recorded");
+    reject("table '" + std::string(table.name) + "' has no columns; name a recording of wrenchd");
+  for (const RecordField& field : table.fields) {
+    const std::string named = "column '" + std::string(field.name) + "' of table '" + table.name + "'";
+    const int index = H5Tget_member_index(type, field.name);
+    if (index < 0) reject(named + " is missing; the file was changed, take it as it was recorded");
+    const Handle column(H5Tget_member_type(type, static_cast<unsigned>(index)), H5Tclose);
+    if (!column.ok() || !has_type_of(field, column))
+      reject(named + " has another type than recordings have; the file was changed");
+  }
+  if (static_cast<std::size_t>(H5Tget_nmembers(type)) != table.fields.size())
+    reject("table '" + std::string(table.name) + "' has columns that recordings do not have; the file was "
+                                                 "changed");
 }
 
-template <class Row>
-std::vector<Row> read_table(const OpenFile& open_file, const TableKind& table) {
-  const Handle set(H5Dopen2(open_file.file, table.path, H5P_DEFAULT), H5Dclose);
-  if (!set.ok())
-    open_file.reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
-  check_columns(open_file, table, set);
+void read_table(const OpenRecording& recording, const TableKind& table, FrameKind kind, RecordingEncoder& out) {
+  if (!has(recording.file, table.path + 1))
+    reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
+  const Handle set(open_set(recording.file, table.path + 1), H5Dclose);
+  check_columns(table, set);
   const Handle space(H5Dget_space(set), H5Sclose);
   hsize_t rows = 0;
   if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &rows, nullptr) != 1)
-    open_file.reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
-  if (rows > open_file.bytes * kMaxExpansion / table.row_bytes + 1)
-    open_file.reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
-                     " rows that its header states; the file is damaged");
-  std::vector<Row> read(rows);
+    reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
+  if (rows > recording.bytes * kMaxExpansion / table.row_bytes + 1)
+    reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
+           " rows that its header states; the file is damaged");
   const Handle row(row_type(table), H5Tclose);
-  if (rows > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()) < 0)
-    open_file.reject("table '" + std::string(table.name) +
-                     "' cannot be read; the file is damaged or truncated");
-  return read;
+  const std::size_t rows_in_frame = RecordingEncoder::kMaxFrame_bytes / table.row_bytes;
+  const hsize_t step = std::min<hsize_t>(kReadRows, rows_in_frame);
+  std::vector<char> bytes(step * table.row_bytes);
+  for (hsize_t first = 0; first < rows; first += step) {
+    const hsize_t count = std::min(step, rows - first);
+    const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    std::fill(bytes.begin(), bytes.end(), '\0');  // the padding
+    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, nullptr, &count, nullptr) < 0 ||
+        H5Dread(set, row, in_memory, space, H5P_DEFAULT, bytes.data()) < 0)
+      reject("table '" + std::string(table.name) + "' cannot be read; the file is damaged or truncated");
+    out.put(kind, {bytes.data(), count * table.row_bytes});
+  }
 }
 
-/// Returns true for a row that was allocated but not written when the process died. HDF5 reads it as zeros.
-bool is_unwritten(const TickRow& row) {
-  return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
+/// The file image of the core driver of libhdf5. The library uses the bytes where they are, and opens no file.
+void* image_malloc(std::size_t, H5FD_file_image_op_t, void* image) {
+  return const_cast<char*>(static_cast<std::span<const char>*>(image)->data());
+}
+void* image_memcpy(void* to, const void*, std::size_t, H5FD_file_image_op_t, void*) {
+  return to;
+}
+void* image_realloc(void*, std::size_t, H5FD_file_image_op_t, void*) {
+  return nullptr;  // a file that is only read does not grow
+}
+herr_t image_free(void*, H5FD_file_image_op_t, void*) {
+  return 0;
+}
+void* image_copy_data(void* image) {
+  return image;
+}
+herr_t image_free_data(void*) {
+  return 0;
+}
+
+hid_t open_image(std::span<const char>& bytes) {
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5FD_file_image_callbacks_t callbacks = {image_malloc,    image_memcpy,    image_realloc, image_free,
+                                           image_copy_data, image_free_data, &bytes};
+  if (H5Pset_fapl_core(access, std::size_t{1} << 16, 0) < 0 ||
+      H5Pset_file_image_callbacks(access, &callbacks) < 0 ||
+      H5Pset_file_image(access, const_cast<char*>(bytes.data()), bytes.size()) < 0)
+    return -1;
+  return H5Fopen("recording", H5F_ACC_RDONLY, access);
+}
+
+constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+
+void parse(std::span<const char>& bytes, RecordingEncoder& out) {
+  H5PLset_loading_state(0);  // no filters from files
+  const Handle file(bytes.empty() ? -1 : open_image(bytes), H5Fclose);
+  if (!file.ok())
+    reject(std::string_view(bytes.data(), bytes.size()).starts_with(kSignature)
+               ? "is truncated or damaged; use a complete copy"
+               : "is not an HDF5 file; name a recording of wrenchd");
+  const OpenRecording recording{file, bytes.size()};
+  for (const std::string& name : names_in(file)) require_hard_link(file, name.c_str());
+  check_format(recording);
+  read_header(recording, out);
+  read_table(recording, tick_table(), FrameKind::ticks, out);
+  read_table(recording, contact_table(), FrameKind::contacts, out);
+  out.put(FrameKind::end, {});
 }
 
 }  // namespace
 
-Recording read_recording(const std::filesystem::path& file) {
+void parse_recording(std::span<const char> bytes, RecordingEncoder& out) {
   silence_hdf5();
-  std::error_code error;
-  const std::uint64_t bytes = std::filesystem::file_size(file, error);
-  if (error) throw RecordingError(file.string() + ": does not exist; name a recording of wrenchd");
-  const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  const OpenFile open_file{file, id, bytes};
-  if (!id.ok())
-    open_file.reject(H5Fis_hdf5(file.c_str()) > 0 ? "is truncated or damaged; use a complete copy"
-                                                  : "is not an HDF5 file; name a recording of wrenchd");
-  check_format(open_file);
-  Recording recording;
-  recording.header = read_header(open_file);
-  std::vector<TickRow> rows = read_table<TickRow>(open_file, tick_table());
-  recording.contacts = read_table<Touch>(open_file, contact_table());
-  while (rows.size() > 1 && is_unwritten(rows.back())) rows.pop_back();
-  recording.ticks.reserve(rows.size());
-  recording.contact_ranges.reserve(rows.size());
-  const std::uint64_t contacts = recording.contacts.size();
-  for (const TickRow& row : rows) {
-    const bool valid = row.first_contact <= contacts && row.contact_count <= contacts - row.first_contact;
-    recording.ticks.push_back(row.tick);
-    recording.contact_ranges.push_back(valid ? ContactRange{row.first_contact, row.contact_count}
-                                             : ContactRange{});
+  try {
+    parse(bytes, out);
+  } catch (const Rejected& error) {
+    out.put(FrameKind::error, error.what());
   }
-  return recording;
 }
 
 }  // namespace wrenchd

@@ -128,7 +128,7 @@ TEST_CASE("invalid settings are rejected with location and remedy", "[config]") 
       {"[device]\nscene = 'x.toml'", "2:1", "key 'device.scene' is not known; known keys here: 'profile'"},
       {"scene = 'nowhere.toml'", "1:9", "no such file; searched /"},
       {"scene = 7", "1:9", "expected a text between quotation marks, found 7"},
-      {"scene = \"a\\u0000b\"", "1:9", "expected a file name without a zero byte"},
+      {"scene = \"a\\u0000b\"", "1:9", "expected a file name without control characters"},
       {"\n[device]\nprofile = 'lopback'", "3:11", "profiles/lopback.toml"},
       {"[device]\nbase_in_world = { position_mm = [1, 2, 3] }", "2:19", "give it in m as 'position_m'"},
       {"[device]\nbase_in_world = { position_m = [1, 2] }", "2:32",
