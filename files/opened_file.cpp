@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include <fcntl.h>
@@ -25,7 +26,8 @@ constexpr int kFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
 constexpr std::size_t kReadBytes = std::size_t{1} << 20;
 
 fs::path normal(const fs::path& file) {
-  fs::path path = fs::absolute(file).lexically_normal();
+  std::error_code error;  // the working directory may be gone
+  fs::path path = fs::absolute(file, error).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();  // "/etc/wrenchd/" is "/etc/wrenchd"
   return path;
 }
@@ -95,7 +97,7 @@ FileScope FileScope::beneath(std::vector<fs::path> directories) {
 }
 
 fs::path FileScope::directory_of(const fs::path& file) const {
-  if (file.native().find('\0') != std::string::npos) return {};
+  if (file.empty() || file.native().find('\0') != std::string::npos) return {};
   const fs::path path = normal(file);
   for (const fs::path& directory : directories_) {
     const auto [in_directory, in_path] =
