@@ -228,7 +228,7 @@ class FrameReader {
   };
 
   static void read_name(const TomlValue& value, std::string& name) {
-    if (value.text(name) && name.empty()) value.reject("must not be empty; it is what people read");
+    if (value.line(name) && name.empty()) value.reject("must not be empty; it is what people read");
   }
 
   void read_checksum_place(TomlTable& table, std::size_t length) {
@@ -307,7 +307,7 @@ void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const
   frame.field(table.optional("joints"), r.joints, {joints, true});
   frame.statuses(table.optional("status"), r.status);
   frame.values(table.optional("values"), r.values);
-  table.optional("name").text(r.name);
+  table.optional("name").line(r.name);
 }
 
 // an i16 with a step rounded down from 1/32767 reaches slightly less than 1

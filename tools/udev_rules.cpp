@@ -5,10 +5,13 @@
 #include <array>
 #include <cstdio>
 #include <map>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "config/config_error.hpp"
+#include "config/load_profile.hpp"
 #include "daemon/version.hpp"
 #include "devices/discovery/unusable_devices.hpp"
 
@@ -77,6 +80,10 @@ SUBSYSTEM=="input", ATTRS{idVendor}==")" +
 std::string udev_rules(std::span<const DeviceProfile> profiles) {
   WantedById wanted;
   for (const DeviceProfile& profile : profiles) {
+    // udev executes rules as root. A name with a line feed would start a rule of its own.
+    if (!is_profile_name(profile.name))
+      throw std::invalid_argument("the profile '" + printable(profile.name) +
+                                  "' has no valid name: use letters, digits, -, _ and dots");
     if (profile.transport == Transport::loopback) continue;
     for (const auto* ids : {&profile.match.usb, &profile.match.usb_by_layout})
       for (const UsbId id : *ids) want(wanted, profile, id);

@@ -8,9 +8,11 @@
 #include <stdexcept>
 
 #include <fcntl.h>
+#include <linux/sockios.h>
 #include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -25,6 +27,9 @@ constexpr std::uint64_t kWake = 1;
 constexpr int kAcceptPerRound = 16;
 /// Pause before the next accept() if the process has no free descriptors.
 constexpr Duration kAcceptPause = std::chrono::milliseconds(100);
+/// Pause before the next attempt to send to a client that does not receive descriptors. Epoll does not report
+/// when it has received them.
+constexpr Duration kSendPause = std::chrono::milliseconds(20);
 /// Cost of a read. It makes many small writes no cheaper than one large write.
 constexpr double kRead_lines = 0.25;
 /// Events for one client in one round, so that the backlog of one client does not delay the others.
@@ -73,6 +78,17 @@ ssize_t send_some(int socket, std::string_view bytes, int fd) {
     std::memcpy(CMSG_DATA(header), &fd, sizeof fd);
   }
   return ::sendmsg(socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+/// Returns a descriptor of its own for the reply; none if the result has none. A reply without its descriptor
+/// would look like a success: throws RpcError if the process has no free descriptor.
+OwnedFd descriptor_of(const MethodResult& answer) {
+  if (answer.fd < 0) return {};
+  OwnedFd fd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
+  if (!fd)
+    throw RpcError(RpcCode::internal_error, std::string("The descriptor of the reply cannot be made: ") +
+                                                std::strerror(errno) + "; try again in a moment.");
+  return fd;
 }
 
 /// Sends one error line, if the socket has room for it.
@@ -136,6 +152,8 @@ int ControlSocket::wait_ms(TimePoint now) const {
   TimePoint until = lease_.next_check_at();
   if (accept_again_at_ > now) until = std::min(until, accept_again_at_);
   for (const auto& [number, client] : clients_) {
+    if (!client.output.empty() && client.send_again_at > now) until = std::min(until, client.send_again_at);
+    if (client.unsent_fds >= kMaxUnsentDescriptors) continue;
     if (client.close_after_flush || client.output_bytes >= kMaxUnsent_bytes) continue;
     if (client.end_of_input && !client.has_complete_line) continue;
     if (client.tokens <= 0.0)
@@ -225,8 +243,8 @@ void ControlSocket::evict_client() {
 
 /// Returns true if the client has tokens and reads its replies.
 bool ControlSocket::can_process_line(const Client& client) const noexcept {
-  return client.tokens > 0.0 && client.output_bytes < kMaxUnsent_bytes && !client.close_after_flush &&
-         !client.to_remove;
+  return client.tokens > 0.0 && client.output_bytes < kMaxUnsent_bytes &&
+         client.unsent_fds < kMaxUnsentDescriptors && !client.close_after_flush && !client.to_remove;
 }
 
 void ControlSocket::serve(Client& client, TimePoint now) {
@@ -237,7 +255,7 @@ void ControlSocket::serve(Client& client, TimePoint now) {
     read_input(client, now);
   process_lines(client);
   send_events(client);
-  flush(client);
+  flush(client, now);
   const bool done = client.end_of_input && !client.has_complete_line && client.pending_methods == 0 &&
                     !client.subscription.active;
   if (client.output.empty() && (client.close_after_flush || done)) client.to_remove = true;
@@ -294,8 +312,7 @@ void ControlSocket::process_line(Client& client, std::string_view line) {
     if (row.slow) return run_slow_method(client, row, request, caller);
     const MethodResult answer = MethodTable::run(row, request.params, caller);
     if (!request.wants_reply) return;
-    OwnedFd fd;
-    if (answer.fd >= 0) fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
+    OwnedFd fd = descriptor_of(answer);
     queue_line(client, reply_line(request.id, answer.result), std::move(fd));
   } catch (const RpcError& error) {
     if (request.wants_reply) queue_line(client, error_line(request.id, error));
@@ -308,11 +325,12 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     throw RpcError(RpcCode::invalid_state, "Your last request of this kind still runs; wait for its reply.");
   Caller worker_caller = caller;
   worker_caller.subscription = nullptr;
-  const bool posted = worker_->post([this, &row, request, worker_caller] {
+  const bool reserved = client.role >= Role::operator_;
+  const auto refusal = worker_->post(client.peer.uid, reserved, [this, &row, request, worker_caller] {
     Finished finished{worker_caller.client, {}, {}};
     try {
       const MethodResult answer = MethodTable::run(row, request.params, worker_caller);
-      if (answer.fd >= 0) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
+      if (request.wants_reply) finished.fd = descriptor_of(answer);
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {
       if (request.wants_reply) finished.line = error_line(request.id, error);
@@ -323,7 +341,10 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     }
     notify(wake_fd_.get());
   });
-  if (!posted)
+  if (refusal == WorkerQueue::Refusal::user_full)
+    throw RpcError(RpcCode::invalid_state,
+                   "Your user has too many slow requests in the queue; wait for their replies.");
+  if (refusal == WorkerQueue::Refusal::full)
     throw RpcError(RpcCode::invalid_state, "The queue of slow requests is full; try again in a moment.");
   ++client.pending_methods;
 }
@@ -366,22 +387,47 @@ void ControlSocket::send_events(Client& client) {
 
 void ControlSocket::queue_line(Client& client, std::string line, OwnedFd fd) {
   client.output_bytes += line.size();
+  if (fd) ++client.unsent_fds;
   client.output.push_back({std::move(line), 0, std::move(fd)});
 }
 
-void ControlSocket::flush(Client& client) {
+/// Returns true if the client, and its user, have received enough of the descriptors that were sent to them.
+bool ControlSocket::may_send_descriptor(Client& client) {
+  std::size_t of_user = 0;
+  for (auto& [number, other] : clients_) {
+    if (other.peer.uid != client.peer.uid || other.in_flight_fds == 0) continue;
+    int unread = 0;  // bytes that the other end has not received
+    if (::ioctl(other.socket.get(), SIOCOUTQ, &unread) == 0 && unread == 0) other.in_flight_fds = 0;
+    of_user += other.in_flight_fds;
+  }
+  return client.in_flight_fds < kMaxInFlight && of_user < kMaxInFlightPerUser;
+}
+
+void ControlSocket::flush(Client& client, TimePoint now) {
+  if (now < client.send_again_at) return;
   while (!client.output.empty() && !client.to_remove) {
     Chunk& chunk = client.output.front();
+    if (chunk.fd && !may_send_descriptor(client)) {
+      client.send_again_at = now + kSendPause;
+      return;
+    }
     const std::string_view rest = std::string_view(chunk.bytes).substr(chunk.sent);
     const ssize_t sent = send_some(client.socket.get(), rest, chunk.fd.get());
-    if (sent < 0 && (errno == EAGAIN || errno == EINTR || errno == ENOBUFS || errno == ETOOMANYREFS)) return;
+    // The socket stays writable, so epoll would report it again at once.
+    if (sent < 0 && (errno == ENOBUFS || errno == ENOMEM || errno == ETOOMANYREFS)) {
+      client.send_again_at = now + kSendPause;
+      return;
+    }
+    if (sent < 0 && (errno == EAGAIN || errno == EINTR)) return;
     if (sent < 0) {  // the client does not read any more; its earlier requests are still processed
       client.output.clear();
       client.output_bytes = 0;
+      client.unsent_fds = 0;
       client.subscription.active = false;
       if (!client.disconnected) client.to_remove = true;
       return;
     }
+    if (chunk.fd) --client.unsent_fds, ++client.in_flight_fds;
     chunk.fd.reset();
     chunk.sent += static_cast<std::size_t>(sent);
     if (chunk.sent < chunk.bytes.size()) continue;
@@ -401,7 +447,8 @@ void ControlSocket::update_epoll_events(Client& client) {
   // The feed does not wake this thread for events that did not fit into this round. EPOLLOUT starts the next
   // one.
   const bool behind = client.subscription.active && client.subscription.has_backlog;
-  if (!client.output.empty() || behind) wanted |= EPOLLOUT;
+  const bool pausing = !client.output.empty() && client.send_again_at > wall_now();
+  if ((!client.output.empty() || behind) && !pausing) wanted |= EPOLLOUT;
   if (wanted == client.epoll_events) return;
   epoll_event event{};
   event.events = wanted;
@@ -427,7 +474,7 @@ void ControlSocket::flush_before_exit() {
   feed_.drain();
   for (auto& [number, client] : clients_) {
     send_events(client);
-    flush(client);
+    flush(client, wall_now());
   }
   clients_.clear();
 }

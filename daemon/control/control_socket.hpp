@@ -36,6 +36,12 @@ inline constexpr std::size_t kReadPerRound_bytes = std::size_t{16} * 1024;
 /// Largest amount of unsent replies. Events stop at half of it; the feed counts events that are lost
 /// meanwhile.
 inline constexpr std::size_t kMaxUnsent_bytes = std::size_t{256} * 1024;
+/// Largest number of descriptors that wait in unsent replies. The socket does not read a client that has more.
+inline constexpr std::size_t kMaxUnsentDescriptors = 2;
+/// Largest number of descriptors that a client, and all clients of a user, have not received yet. The kernel
+/// limits the sum over all clients (ETOOMANYREFS), which one user must not use up.
+inline constexpr std::size_t kMaxInFlight = 4;
+inline constexpr std::size_t kMaxInFlightPerUser = 32;
 
 /// Returns the peer of a socket. Tests replace peer_of().
 using IdentifyPeer = std::function<std::optional<Peer>(int socket)>;
@@ -73,6 +79,9 @@ class ControlSocket {
     bool has_complete_line = false;  ///< `input` holds a complete line
     std::deque<Chunk> output;
     std::size_t output_bytes = 0;
+    std::size_t unsent_fds = 0;     ///< descriptors in `output`
+    std::size_t in_flight_fds = 0;  ///< descriptors that were sent, and that the client may not have received
+    TimePoint send_again_at{};      ///< the kernel or a limit refused to send: no attempt before
     double tokens =
         kBurst_lines;  ///< lines it may send now; what a long one costs too much makes it negative
     TimePoint tokens_refilled_at{};
@@ -108,7 +117,8 @@ class ControlSocket {
   void send_finished_results();
   void send_events(Client& client);
   void queue_line(Client& client, std::string line, OwnedFd fd = {});
-  void flush(Client& client);
+  void flush(Client& client, TimePoint now);
+  bool may_send_descriptor(Client& client);
   void update_epoll_events(Client& client);
   void remove_clients();
   bool can_process_line(const Client& client) const noexcept;

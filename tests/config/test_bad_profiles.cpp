@@ -494,4 +494,20 @@ TEST_CASE("a hundred invalid profiles are rejected with location and remedy", "[
   }
 }
 
+TEST_CASE("the name of a profile has only letters, digits, -, _ and dots", "[profile][bad]") {
+  const test::TemporaryDirectory directory;
+  const auto load = [&](const std::string& name) {
+    std::string text = kWhole;
+    text.replace(text.find("\"p\""), 3, '"' + name + '"');
+    return load_profile(directory.write("p.toml", text));
+  };
+  CHECK(load("Arm-2.b_c").name == "Arm-2.b_c");
+  for (const char* name : {R"(arm\nACTION==\"add\", RUN+=\"/bin/sh\")", "a b", R"(a\u001b[31m)", "a/b",
+                           "a\u00e9", R"(a\"b)"}) {
+    INFO(name);
+    CHECK_THROWS_WITH(load(name), Catch::Contains("is not a valid name"));
+  }
+  CHECK_THROWS_WITH(load(std::string(kMaxProfileName_bytes + 1, 'a')), Catch::Contains("is not a valid name"));
+}
+
 }  // namespace wrenchd

@@ -50,6 +50,15 @@ TEST_CASE(
             R"(LABEL="wrenchd_end")"});
 }
 
+TEST_CASE("a profile whose name would become a rule is refused", "[udev_rules]") {
+  for (const char* name : {"arm\nACTION==\"add\", RUN+=\"/bin/sh\"", "arm\r", "a b", "a\"b", "#", "a/b", ""}) {
+    INFO(name);
+    CHECK_THROWS_AS(udev_rules(std::vector{profile(name, Transport::hidraw, {{0x16c0, 0x0486}})}),
+                    std::invalid_argument);
+  }
+  CHECK_NOTHROW(udev_rules(std::vector{profile("arm-2.b_C", Transport::hidraw, {{0x16c0, 0x0486}})}));
+}
+
 TEST_CASE("a libusb device: the rules cover its USB node, not only its power settings", "[udev_rules]") {
   const auto lines = rules_of({profile("falcon", Transport::libusb, {{0x0403, 0xcb48}})});
   REQUIRE(lines.size() == 4);

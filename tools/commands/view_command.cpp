@@ -23,7 +23,8 @@ class ViewCommand final : public Subcommand {
         ->check(not_empty());
     view->add_flag("--open", options_.open_browser, "open the page in a browser with xdg-open");
     view->footer(
-        "Prints the address, which contains a token; only the complete address works. The page can arm with\n"
+        "Prints the address, which contains a token; only the complete address works, and only for programs\n"
+        "of the user who runs this command, and of root. The page can arm with\n"
         "the rights of the user who runs this command, while the page is open and visible. The emergency\n"
         "stop requires no lease.");
     view->callback([this] { run_view(options_); });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <spawn.h>
@@ -14,18 +15,21 @@
 #include "daemon/recording/recorded_run.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/recorded_feed.hpp"
+#include "tools/view/redirect_page.hpp"
 #include "tools/view/view_server.hpp"
 
 namespace wrenchd {
 namespace {
 
 void serve(ViewServer& server, const ViewOptions& options) {
-  std::string url = server.url();
+  const std::string url = server.url();
   std::printf("%s\n", url.c_str());
   std::fflush(stdout);
+  std::optional<RedirectPage> page;
   if (options.open_browser) {
-    std::string program = "xdg-open";
-    char* const words[] = {program.data(), url.data(), nullptr};
+    page.emplace(url);  // the address contains the token, and every user can read a command line
+    std::string program = "xdg-open", file = page->file().string();
+    char* const words[] = {program.data(), file.data(), nullptr};
     pid_t pid = -1;
     if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
       std::fputs("wrenchctl: xdg-open is missing; open the address by hand\n", stderr);

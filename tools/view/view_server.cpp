@@ -19,10 +19,13 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
+#include <arpa/inet.h>
 #include <sys/random.h>
+#include <unistd.h>
 
 #include "core/fault.hpp"
 #include "daemon/version.hpp"
+#include "tools/view/connection_owner.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/page_lease.hpp"
 #include "tools/view/recorded_feed.hpp"
@@ -39,6 +42,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kFrameEvery = 16ms;
 constexpr auto kTimesEvery = 250ms;
+constexpr auto kAcceptPause = 100ms;
 constexpr auto kRequestWithin = 20s;
 constexpr std::size_t kMaxConnections = 32;
 /// Maximum number of unsent messages per page; above it the server closes the connection.
@@ -100,6 +104,7 @@ struct ViewServer::Server {
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
   asio::steady_timer frame_timer{io};
+  asio::steady_timer accept_timer{io};
   asio::signal_set signals{io};
   PageFiles files;
   std::string token = random_token();
@@ -418,10 +423,38 @@ ViewServer::Server::Server(std::uint16_t requested_port, PageFiles page_files)
   });
 }
 
+namespace {
+
+/// Returns true if the process at the other end belongs to the user of this process, or to root. TCP has no
+/// credentials, so the kernel's table of connections tells the user.
+bool is_permitted(const tcp::socket& socket) {
+  boost::system::error_code error;
+  const tcp::endpoint peer = socket.remote_endpoint(error);
+  if (error) return false;
+  const tcp::endpoint own = socket.local_endpoint(error);
+  if (error || !peer.address().is_v4() || !own.address().is_v4()) return false;
+  const auto end_of = [](const tcp::endpoint& end) {
+    return TcpEnd{htonl(end.address().to_v4().to_uint()), end.port()};
+  };
+  const auto owner = connection_owner(end_of(peer), end_of(own));
+  return owner && (*owner == geteuid() || *owner == 0);
+}
+
+}  // namespace
+
 void ViewServer::Server::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error && connections < kMaxConnections) {
+    if (error) {  // for example no free descriptors: the next attempt would fail at once
+      accept_timer.expires_after(kAcceptPause);
+      accept_timer.async_wait([this](beast::error_code cancelled) {
+        if (!cancelled) accept();
+      });
+      return;
+    }
+    // A connection of another user ends before it counts: it can neither use a token that it has learned, nor
+    // use up the connections.
+    if (is_permitted(socket) && connections < kMaxConnections) {
       socket.set_option(tcp::no_delay(true), error);
       ++connections;
       std::make_shared<Visit<Server>>(std::move(socket), *this)->read();

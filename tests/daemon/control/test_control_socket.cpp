@@ -594,10 +594,10 @@ TEST_CASE("a slow method blocks no other client, and its response follows when i
   CHECK(patient.error_code("status") == 0);
   CHECK(patient.error_code("test.wait") == code_of(RpcCode::invalid_state));
   std::vector<RigClient> others;
-  for (std::size_t i = 0; i < WorkerQueue::kMaxQueued + 2; ++i) {
+  for (std::size_t i = 0; i < WorkerQueue::kMaxQueuedPerUser + 2; ++i) {
     others.push_back(rig.connect(TestUser::observer));
     others.back().send(request("test.wait", "{}", "\"w\""));
-    if (i >= WorkerQueue::kMaxQueued) CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
+    if (i >= WorkerQueue::kMaxQueuedPerUser) CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
     CHECK(others.back().error_code("status") == 0);
   }
   others.front().disconnect();
@@ -606,6 +606,107 @@ TEST_CASE("a slow method blocks no other client, and its response follows when i
   REQUIRE(line);
   CHECK(Json::parse(*line)["result"].contains("client"));
   CHECK(next_code(others[1]) == 0);
+}
+
+/// Returns true if a response with a descriptor comes.
+bool receives_descriptor(RigClient& client, const std::string& method) {
+  client.send(request(method));
+  for (std::string text; text.find('\n') == std::string::npos;) {
+    std::array<char, 4096> bytes{};
+    iovec part{bytes.data(), bytes.size()};
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    pollfd readable{client.fd(), POLLIN, 0};
+    if (::poll(&readable, 1, 5000) <= 0) return false;
+    const ssize_t got = ::recvmsg(client.fd(), &message, MSG_CMSG_CLOEXEC);
+    if (got <= 0) return false;
+    text.append(bytes.data(), static_cast<std::size_t>(got));
+    if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr) {
+      int fd = -1;
+      std::memcpy(&fd, CMSG_DATA(header), sizeof fd);
+      const OwnedFd received(fd);
+      return static_cast<bool>(received);
+    }
+  }
+  return false;
+}
+
+/// Hands over a descriptor. slow: through the worker.
+MethodRow opens(const std::string& name, bool slow) {
+  return {name, Role::observer, {}, "Hands over a descriptor.",
+          [](const Json&, const Caller&) {
+            return MethodResult(Json{{"open", true}}, OwnedFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)));
+          },
+          slow};
+}
+
+TEST_CASE("clients that do not read descriptors use up neither the daemon's nor those of other users",
+          "[control_socket]") {
+  ControlRig rig(resting_config(), {opens("test.open", false), opens("test.open_slow", true)});
+  const std::size_t before = open_descriptors();
+  std::vector<RigClient> greedy;
+  for (std::size_t i = 0; i + 1 < kMaxClients; ++i) greedy.push_back(rig.connect(TestUser::observer));
+  const std::string many = [] {
+    std::string lines;
+    for (int i = 0; i < 90; ++i) lines += request("test.open");
+    return lines + request("test.open_slow");
+  }();
+  for (RigClient& client : greedy) client.send(many);
+  RigClient other = rig.connect(TestUser::operator_);
+  for (int i = 0; i < 10; ++i) {
+    CHECK(receives_descriptor(other, i % 2 == 0 ? "test.open" : "test.open_slow"));
+    CHECK(other.error_code("status") == 0);
+  }
+  std::this_thread::sleep_for(200ms);
+  // Of each client: its two ends of the socket, and unsent descriptors.
+  const std::size_t most = before + 2 * (greedy.size() + 1) + kMaxUnsentDescriptors * greedy.size() + 16;
+  CHECK(open_descriptors() <= most);
+  // Its user has received enough when the other clients are gone.
+  for (std::size_t i = 1; i < greedy.size(); ++i) greedy[i].disconnect();
+  // A client that reads again receives all of its replies, each with its descriptor.
+  std::size_t replies = 0;
+  for (; replies < 90 && greedy.front().read_line(5000ms); ++replies) {
+  }
+  CHECK(replies == 90);
+}
+
+TEST_CASE("a reply whose descriptor cannot be made is an error", "[control_socket]") {
+  const MethodRow stale{"test.stale", Role::observer, {}, "Hands over a closed descriptor.",
+                        [](const Json&, const Caller&) { return MethodResult(Json{{"open", true}}, 1'000'000); }};
+  ControlRig rig(resting_config(), {stale});
+  RigClient client = rig.connect(TestUser::observer);
+  CHECK(client.error_code("test.stale") == code_of(RpcCode::internal_error));
+}
+
+TEST_CASE("the slow requests of one user delay those of another by one task", "[control_socket]") {
+  std::atomic<int> ran{0};
+  std::atomic<bool> go{false};
+  std::atomic<int> turn_of_other{-1};
+  const MethodRow wait{"test.wait", Role::observer, {}, "Takes a while.",
+                       [&](const Json&, const Caller& caller) {
+                         while (!go) std::this_thread::sleep_for(1ms);
+                         const int turn = ran++;
+                         if (caller.role == Role::operator_) turn_of_other = turn;
+                         return MethodResult(Json::object());
+                       },
+                       true};
+  ControlRig rig(resting_config(), {wait});
+  std::vector<RigClient> flood;
+  for (std::size_t i = 0; i < WorkerQueue::kMaxQueuedPerUser; ++i) {
+    flood.push_back(rig.connect(TestUser::observer));
+    flood.back().send(request("test.wait"));
+    CHECK(flood.back().error_code("status") == 0);
+  }
+  RigClient other = rig.connect(TestUser::operator_);
+  other.send(request("test.wait"));
+  CHECK(other.error_code("status") == 0);
+  go = true;
+  while (turn_of_other < 0) std::this_thread::sleep_for(1ms);
+  CHECK(turn_of_other <= 1);
 }
 
 TEST_CASE("a descriptor is sent with its response", "[control_socket]") {

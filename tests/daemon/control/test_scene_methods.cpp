@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include <catch2/catch.hpp>
 
+#include "config/load_scene.hpp"
 #include "daemon/control/scene_methods.hpp"
 #include "tests/support/shipped_config.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 // Clients read and change the rendering: each request is looked up in the method table, with a role and
 // parameters in JSON.
@@ -29,7 +34,9 @@ struct Rig {
   Json ask(const std::string& method, const Json& params = Json::object(),
            Role role = Role::administrator) const {
     const RpcRequest request{method, params, 1, true};
-    return MethodTable::run(table.look_up(request, role), params, {}).result;
+    Caller caller;
+    caller.role = role;
+    return MethodTable::run(table.look_up(request, role), params, caller).result;
   }
   /// Returns the error that the request is answered with.
   RpcError rejected(const std::string& method, const Json& params, Role role = Role::administrator) const {
@@ -86,6 +93,142 @@ TEST_CASE("scene.load finds the file on the search path and replaces the whole s
   CHECK(none.code() == RpcCode::rejected);
   has(none, "scenes/no_such.toml");
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
+}
+
+namespace fs = std::filesystem;
+
+void has_not(const RpcError& error, const std::string& part) {
+  INFO(error.what());
+  CHECK(std::string(error.what()).find(part) == std::string::npos);
+}
+
+/// The configured scene in a directory of its own, beside a file that nobody may learn of.
+struct Private {
+  TemporaryDirectory files;
+  fs::path scene, secret;
+  RunConfig plan = shipped_config();
+
+  Private() {
+    fs::create_directory(files.path() / "scenes");
+    std::ifstream cube(WRENCHD_SOURCE_DIR "/config/meshes/cube.off");
+    files.write("scenes/cube.off", std::string(std::istreambuf_iterator<char>(cube), {}));
+    scene = files.write("scenes/scene.toml", "[tool]\nmesh = \"cube.off\"\nscale = 0.001\n");
+    secret = files.write("secret", "root:x:0:0 very secret");
+    plan.settings.scene = scene;
+    plan.scene = load_scene(scene, &plan.texts);
+  }
+};
+
+TEST_CASE("an operator loads only scenes and meshes beneath the directories of scenes, without links",
+          "[scene_methods][trust]") {
+  Private p;
+  const Rig a(p.plan);
+  const auto load = [&](const fs::path& file) {
+    return a.rejected("scene.load", {{"file", file.string()}}, Role::operator_);
+  };
+  const fs::path next =
+      p.files.write("scenes/next.toml", "[tool]\nmesh = \"cube.off\"\nscale = 0.001\n");
+  CHECK_NOTHROW(a.ask("scene.load", {{"file", next.string()}}, Role::operator_));
+  CHECK_NOTHROW(a.ask("scene.load", {{"file", "scenes/cube_over_plunger.toml"}}, Role::operator_));
+
+  // Outside: the same answer whether the file exists or not.
+  const std::string is_outside = "is outside the directories that you may use";
+  const fs::path outside =
+      p.files.write("outside.toml", "[tool]\nmesh = \"scenes/cube.off\"\nscale = 0.001\n");
+  has(load(outside), is_outside);
+  has(load(p.files.path() / "no_such.toml"), is_outside);
+  has(load(p.files.path() / "scenes/../outside.toml"), is_outside);
+  has(load("../../../../../../../../etc/passwd"), is_outside);
+  CHECK_NOTHROW(a.ask("scene.load", {{"file", outside.string()}}));  // an administrator may
+
+  // Links.
+  fs::create_symlink(p.secret, p.files.path() / "scenes/link.toml");
+  const RpcError link = load(p.files.path() / "scenes/link.toml");
+  has(link, "symbolic link");
+  has_not(link, "root:x");
+  fs::create_symlink(p.secret, p.files.path() / "scenes/link.off");
+  const fs::path linked = p.files.write("scenes/linked.toml", "[tool]\nmesh = \"link.off\"\n");
+  has(load(linked), "symbolic link");
+  has_not(load(linked), "root:x");
+
+  // Meshes.
+  const fs::path far = p.files.write("scenes/far.toml", "[tool]\nmesh = \"../secret.off\"\n");
+  p.files.write("secret.off", "root:x:0:0 very secret");
+  has(load(far), is_outside);
+  const auto add = [&](const std::string& mesh) {
+    return a.rejected("scene.add", {{"obstacle", {{"mesh", mesh}}}}, Role::operator_);
+  };
+  a.ask("scene.load", {{"file", p.scene.string()}}, Role::operator_);
+  has(add("../secret.off"), is_outside);
+  has(add((p.files.path() / "secret.off").string()), is_outside);
+  has(add("/no/such.off"), is_outside);
+  has(add("link.off"), "symbolic link");
+}
+
+TEST_CASE("errors quote content of files only to administrators", "[scene_methods][trust]") {
+  Private p;
+  const Rig a(p.plan);
+  const Json bad = {{"file", p.files.write("scenes/bad.toml", "root:x:0:0\n").string()}};
+  has(a.rejected("scene.load", bad), "bad.toml:1");
+  const RpcError told = a.rejected("scene.load", bad, Role::operator_);
+  has(told, "bad.toml:1");
+  has(told, "wrenchctl check");
+  has_not(told, "root");
+  p.files.write("scenes/bad.off", "OFF\n4 4 6\nroot:x:0:0 1 2\n");
+  const Json add = {{"obstacle", {{"mesh", "bad.off"}}}};
+  has(a.rejected("scene.add", add), "root:x:0:0");
+  const RpcError mesh = a.rejected("scene.add", add, Role::operator_);
+  has(mesh, "bad.off:3");
+  has_not(mesh, "root");
+  // What is wrong in the request itself is told.
+  has(a.rejected("scene.add", {{"obstacle", {{"mesh", "cube.off"}, {"scale", "huge"}}}}, Role::operator_),
+      "huge");
+}
+
+TEST_CASE("a recording contains the bytes that were loaded, whatever their names refer to later",
+          "[scene_methods][trust]") {
+  Private p;
+  const Rig a(p.plan);
+  const std::string scene_text = a.s.runtime.recording_header().scene;
+  CHECK(scene_text == "[tool]\nmesh = \"cube.off\"\nscale = 0.001\n");
+  const auto mesh_in = [&](const std::string& role) {
+    const RecordingHeader header = a.s.runtime.recording_header();
+    for (const RecordedFile& file : header.files)
+      if (file.role == role) return file.bytes;
+    return std::string("not there");
+  };
+  const std::string cube = mesh_in("tool");
+  CHECK(cube.starts_with("OFF"));
+  // Somebody replaces the mesh by a link, and the scene by another text.
+  fs::remove(p.files.path() / "scenes/cube.off");
+  fs::create_symlink(p.secret, p.files.path() / "scenes/cube.off");
+  p.files.write("scenes/scene.toml", "root:x:0:0 very secret");
+  CHECK(mesh_in("tool") == cube);
+  CHECK(a.s.runtime.recording_header().scene == scene_text);
+  // An operator adds and removes an obstacle, which builds the scene again.
+  p.files.write("scenes/post.off", cube);
+  const Json post = {
+      {"obstacle", {{"mesh", "post.off"}, {"scale", 0.001}, {"position_m", {0.0, 0.3, 0.0}}}}};
+  const Json added = a.ask("scene.add", post, Role::operator_);
+  CHECK(mesh_in("tool") == cube);
+  CHECK(mesh_in("obstacle_0") == cube);
+  a.ask("scene.remove", {{"name", added["name"]}}, Role::operator_);
+  CHECK(mesh_in("tool") == cube);
+  CHECK(mesh_in("obstacle_0") == "not there");
+}
+
+TEST_CASE("the event of a rejected reload, which every observer receives, quotes no content",
+          "[scene_methods][trust]") {
+  Private p;
+  Rig a(p.plan);
+  EventFeed feed(a.s.runtime.loop());
+  const fs::path bad = p.files.write("scenes/bad.toml", "root:x:0:0\n");
+  CHECK_THROWS_AS(reload_config(a.s.runtime.reconfigurator(), feed,
+                                [&]() -> RunConfig { return load_run_config({bad, {}, {}, false}, SearchPath()); }),
+                  ConfigError);
+  const EventFeed::Batch events = feed.events_since(0, {"reload"}, 1 << 20);
+  REQUIRE(events.lines.size() == 1);
+  CHECK_THAT(events.lines.front(), Catch::Contains("bad.toml:1") && !Catch::Contains("root"));
 }
 
 TEST_CASE("scene.geometry has the configured viewpoint, and none for a scene that a client loads",
