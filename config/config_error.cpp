@@ -54,7 +54,8 @@ std::string ConfigError::without_content() const {
   std::vector<Rejection> bare = rejections_;
   for (Rejection& rejection : bare)
     if (rejection.location.line > 0)
-      rejection.message = "is not valid; run 'wrenchctl check' on the file, which tells those who may read it";
+      rejection.message =
+          "is not valid; run 'wrenchctl check' on the file, which tells those who may read it";
   return to_lines(bare);
 }
 

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "config/toml_file.hpp"
 #include "config/config_error.hpp"
+#include "config/toml_file.hpp"
 #include "core/simulation_settings.hpp"
 
 namespace wrenchd {

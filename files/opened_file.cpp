@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 using Reason = FileError::Reason;
 
-/// O_NONBLOCK: the open of a FIFO without a writer, or of a file that another program holds a lease on, returns
-/// at once. O_NOCTTY: a terminal does not become the controlling one.
+/// O_NONBLOCK: the open of a FIFO without a writer, or of a file that another program holds a lease on,
+/// returns at once. O_NOCTTY: a terminal does not become the controlling one.
 constexpr int kFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
 constexpr std::size_t kReadBytes = std::size_t{1} << 20;
 
@@ -154,8 +154,7 @@ std::string OpenedFile::read() const {
     const ssize_t got =
         ::pread(fd_.get(), bytes.data() + size, bytes.size() - size, static_cast<off_t>(size));
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0)
-      throw FileError(Reason::unreadable, std::string("cannot be read: ") + std::strerror(errno));
+    if (got < 0) throw FileError(Reason::unreadable, std::string("cannot be read: ") + std::strerror(errno));
     if (got == 0) break;
     size += static_cast<std::uint64_t>(got);
   }

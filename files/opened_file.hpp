@@ -63,8 +63,8 @@ enum class BeneathBy : std::uint8_t {
 OwnedFd open_beneath(const std::filesystem::path& directory, const std::filesystem::path& relative, int flags,
                      BeneathBy by = BeneathBy::kernel);
 
-/// A regular file that was opened once. Its name is not used again, so nobody can replace it between the check
-/// and the reading. Not RT-safe: reads a file, which may take long.
+/// A regular file that was opened once. Its name is not used again, so nobody can replace it between the
+/// check and the reading. Not RT-safe: reads a file, which may take long.
 class OpenedFile {
  public:
   /// Opens without blocking, whatever the name refers to. Throws FileError.
@@ -83,6 +83,7 @@ class OpenedFile {
 };
 
 /// Returns the content of a file. Throws FileError. Not RT-safe: reads a file.
-std::string read_file(const std::filesystem::path& file, std::uint64_t max_bytes, const FileScope& scope = {});
+std::string read_file(const std::filesystem::path& file, std::uint64_t max_bytes,
+                      const FileScope& scope = {});
 
 }  // namespace wrenchd

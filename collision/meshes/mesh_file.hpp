@@ -9,8 +9,8 @@
 
 namespace wrenchd {
 
-/// Returns the bytes of an OFF, OBJ, STL or PLY file, which is opened once. scope: the files that may be read.
-/// Throws MeshError. Not RT-safe: reads a file.
+/// Returns the bytes of an OFF, OBJ, STL or PLY file, which is opened once. scope: the files that may be
+/// read. Throws MeshError. Not RT-safe: reads a file.
 MeshSource read_mesh_source(const std::filesystem::path& file, const FileScope& scope = {});
 
 /// Returns the polygons of a mesh file. The extension of the file name selects the format. Merges equal

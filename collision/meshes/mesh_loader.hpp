@@ -34,8 +34,8 @@ struct MeshBytes {
 struct LoadedMesh {
   std::filesystem::path file;
   std::shared_ptr<const MeshBytes> source;  ///< null for a generated mesh
-  TriangleMesh mesh;                 ///< in the units of the file
-  std::vector<std::string> repairs;  ///< one sentence for each kind of repair (mesh_repair.hpp)
+  TriangleMesh mesh;                        ///< in the units of the file
+  std::vector<std::string> repairs;         ///< one sentence for each kind of repair (mesh_repair.hpp)
 };
 
 /// Loads meshes and prepares them for contact queries. It reads each file once, for any number of bodies.
@@ -108,10 +108,11 @@ class MeshLoader {
   std::vector<std::string> simplifications_;
   std::vector<std::string> warnings_;
   FileScope scope_;
-  std::size_t kept_bytes_ = 0;                               ///< total size of kept file contents
-  std::map<Key, std::shared_ptr<const LoadedMesh>> loaded_;  ///< by canonical name: links share a mesh
-  std::map<Key, std::shared_ptr<const LoadedMesh>> by_name_;   ///< results of load(), by the given name
-  std::map<Key, std::shared_ptr<const LoadedMesh>> reusable_;  ///< meshes of another loader, by the given name
+  std::size_t kept_bytes_ = 0;                                ///< total size of kept file contents
+  std::map<Key, std::shared_ptr<const LoadedMesh>> loaded_;   ///< by canonical name: links share a mesh
+  std::map<Key, std::shared_ptr<const LoadedMesh>> by_name_;  ///< results of load(), by the given name
+  std::map<Key, std::shared_ptr<const LoadedMesh>>
+      reusable_;  ///< meshes of another loader, by the given name
 };
 
 /// Returns why a mesh cannot be used as a body of this kind and how to correct it: "FILE: ...", one line for

@@ -31,8 +31,9 @@ std::optional<T> parsed(std::string_view word) noexcept {
 
 void MeshSource::reject(std::size_t line, const std::string& message) const {
   const std::string place = file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": ";
-  throw MeshError(place + message,
-                  place + "is not a valid mesh; run 'wrenchctl mesh' on the file, which tells those who may read it");
+  throw MeshError(
+      place + message,
+      place + "is not a valid mesh; run 'wrenchctl mesh' on the file, which tells those who may read it");
 }
 
 bool LineReader::next(std::string_view& line) noexcept {

@@ -12,8 +12,8 @@
 
 #include "daemon/control/event_feed.hpp"
 #include "daemon/control/json_rpc.hpp"
-#include "files/owned_fd.hpp"
 #include "daemon/control/role.hpp"
+#include "files/owned_fd.hpp"
 
 namespace wrenchd {
 

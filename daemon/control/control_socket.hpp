@@ -36,7 +36,8 @@ inline constexpr std::size_t kReadPerRound_bytes = std::size_t{16} * 1024;
 /// Largest amount of unsent replies. Events stop at half of it; the feed counts events that are lost
 /// meanwhile.
 inline constexpr std::size_t kMaxUnsent_bytes = std::size_t{256} * 1024;
-/// Largest number of descriptors that wait in unsent replies. The socket does not read a client that has more.
+/// Largest number of descriptors that wait in unsent replies. The socket does not read a client that has
+/// more.
 inline constexpr std::size_t kMaxUnsentDescriptors = 2;
 /// Largest number of descriptors that a client, and all clients of a user, have not received yet. The kernel
 /// limits the sum over all clients (ETOOMANYREFS), which one user must not use up.

@@ -8,8 +8,8 @@
 #include <sys/types.h>
 
 #include "config/settings.hpp"
-#include "files/owned_fd.hpp"
 #include "daemon/control/role.hpp"
+#include "files/owned_fd.hpp"
 
 namespace wrenchd {
 

@@ -50,15 +50,15 @@ class Reconfigurator {
 
   // --- Scene ---
 
-  /// Files that clients may name who may not configure the daemon: those beneath the directories of the search
-  /// path and of the configured scene.
+  /// Files that clients may name who may not configure the daemon: those beneath the directories of the
+  /// search path and of the configured scene.
   FileScope client_files() const;
 
   /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now. scope: the files that
   /// the client may name; it includes the meshes of the scene.
   void replace_scene(const std::filesystem::path& file, const FileScope& scope = {});
-  /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. scope: the files
-  /// that the client may name. Returns the name of the obstacle.
+  /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. scope: the
+  /// files that the client may name. Returns the name of the obstacle.
   std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
                               const FileScope& scope = {});
   void remove_obstacle(const std::string& name);
@@ -98,7 +98,7 @@ class Reconfigurator {
   /// The inputs of the scene that was offered last: settings, and the bytes that were read from its files.
   struct SceneInputs {
     SceneSettings settings;
-    std::string text;  ///< text of the scene file
+    std::string text;                                                          ///< text of the scene file
     std::map<std::filesystem::path, std::shared_ptr<const MeshBytes>> meshes;  ///< by file name
   };
   SceneInputs scene_inputs() const;

@@ -36,10 +36,9 @@ std::function<void()> WorkerQueue::take_next() {
     const auto found = last_turns_.find(task.user);
     return found == last_turns_.end() ? std::uint64_t{0} : found->second;
   };
-  const auto next =
-      std::min_element(queue_.begin(), queue_.end(), [&](const Task& a, const Task& b) {
-        return last_turn(a) < last_turn(b);  // of equal ones the first that has arrived
-      });
+  const auto next = std::min_element(queue_.begin(), queue_.end(), [&](const Task& a, const Task& b) {
+    return last_turn(a) < last_turn(b);  // of equal ones the first that has arrived
+  });
   const uid_t user = next->user;
   std::function<void()> task = std::move(next->run);
   queue_.erase(next);

@@ -13,9 +13,9 @@
 
 namespace wrenchd {
 
-/// Runs tasks on a thread of its own, so that the control thread does not block. Users take turns: one task of
-/// each user that has queued tasks, in the order of their last turns. A task must not throw: an exception ends
-/// the process. Not RT-safe: allocates.
+/// Runs tasks on a thread of its own, so that the control thread does not block. Users take turns: one task
+/// of each user that has queued tasks, in the order of their last turns. A task must not throw: an exception
+/// ends the process. Not RT-safe: allocates.
 class WorkerQueue {
  public:
   WorkerQueue();
@@ -46,8 +46,9 @@ class WorkerQueue {
   std::condition_variable_any changed_;
   std::deque<Task> queue_;  ///< in the order of arrival
   std::uint64_t turn_ = 0;
-  std::map<uid_t, std::uint64_t> last_turns_;  ///< number of the last turn: users with queued tasks, and the last user
-  std::jthread thread_;                        ///< last member: it uses the members above
+  std::map<uid_t, std::uint64_t>
+      last_turns_;       ///< number of the last turn: users with queued tasks, and the last user
+  std::jthread thread_;  ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

@@ -93,16 +93,17 @@ void deny_system_calls() {
   constexpr std::uint32_t kArchitecture = AUDIT_ARCH_AARCH64;
 #endif
   constexpr std::array kPermitted = {
-      SYS_read,          SYS_write,        SYS_close,          SYS_lseek,        SYS_fstat,
-      SYS_mmap,          SYS_munmap,       SYS_mremap,         SYS_mprotect,     SYS_madvise,
-      SYS_brk,           SYS_futex,        SYS_exit,           SYS_exit_group,   SYS_rt_sigaction,
-      SYS_rt_sigprocmask, SYS_rt_sigreturn, SYS_clock_gettime, SYS_gettimeofday, SYS_getpid,
-      SYS_gettid,        SYS_tgkill,       SYS_sched_yield,    SYS_getrandom,    SYS_restart_syscall};
-  std::vector<sock_filter> program = {
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)),
-      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0),
-      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+      SYS_read,           SYS_write,         SYS_close,        SYS_lseek,
+      SYS_fstat,          SYS_mmap,          SYS_munmap,       SYS_mremap,
+      SYS_mprotect,       SYS_madvise,       SYS_brk,          SYS_futex,
+      SYS_exit,           SYS_exit_group,    SYS_rt_sigaction, SYS_rt_sigprocmask,
+      SYS_rt_sigreturn,   SYS_clock_gettime, SYS_gettimeofday, SYS_getpid,
+      SYS_gettid,         SYS_tgkill,        SYS_sched_yield,  SYS_getrandom,
+      SYS_restart_syscall};
+  std::vector<sock_filter> program = {BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)),
+                                      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0),
+                                      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
+                                      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
   for (const long call : kPermitted) {
     program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 1));
     program.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
@@ -196,9 +197,10 @@ class Child {
 
 }  // namespace
 
-ChildEnd run_limited_child(const ChildLimits& limits,
-                           const std::function<void(const std::function<void(std::string_view)>& write)>& work,
-                           const std::function<bool(std::string_view)>& receive) {
+ChildEnd run_limited_child(
+    const ChildLimits& limits,
+    const std::function<void(const std::function<void(std::string_view)>& write)>& work,
+    const std::function<bool(std::string_view)>& receive) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) fail("pipe");
   OwnedFd in(ends[0]), out(ends[1]);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "config/settings.hpp"
-#include "files/owned_fd.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "files/owned_fd.hpp"
 
 namespace wrenchd {
 

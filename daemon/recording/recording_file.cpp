@@ -391,8 +391,9 @@ void require_plain_storage(hid_t set, const std::string& name) {
   if (kind != H5D_CHUNKED && kind != H5D_CONTIGUOUS && kind != H5D_COMPACT)
     reject("'" + name + "' is not stored in this file, which a recording always is; the file was changed");
   if (H5Pget_external_count(layout) != 0)
-    reject("'" + name + "' is stored in another file (external storage), which a recording never is; the file "
-                        "was changed, take it as it was recorded");
+    reject("'" + name +
+           "' is stored in another file (external storage), which a recording never is; the file "
+           "was changed, take it as it was recorded");
   const int filters = H5Pget_nfilters(layout);
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
@@ -592,11 +593,13 @@ void check_columns(const TableKind& table, hid_t set) {
       reject(named + " has another type than recordings have; the file was changed");
   }
   if (static_cast<std::size_t>(H5Tget_nmembers(type)) != table.fields.size())
-    reject("table '" + std::string(table.name) + "' has columns that recordings do not have; the file was "
-                                                 "changed");
+    reject("table '" + std::string(table.name) +
+           "' has columns that recordings do not have; the file was "
+           "changed");
 }
 
-void read_table(const OpenRecording& recording, const TableKind& table, FrameKind kind, RecordingEncoder& out) {
+void read_table(const OpenRecording& recording, const TableKind& table, FrameKind kind,
+                RecordingEncoder& out) {
   if (!has(recording.file, table.path + 1))
     reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
   const Handle set(open_set(recording.file, table.path + 1), H5Dclose);
@@ -623,7 +626,8 @@ void read_table(const OpenRecording& recording, const TableKind& table, FrameKin
   }
 }
 
-/// The file image of the core driver of libhdf5. The library uses the bytes where they are, and opens no file.
+/// The file image of the core driver of libhdf5. The library uses the bytes where they are, and opens no
+/// file.
 void* image_malloc(std::size_t, H5FD_file_image_op_t, void* image) {
   return const_cast<char*>(static_cast<std::span<const char>*>(image)->data());
 }

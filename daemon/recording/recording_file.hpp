@@ -120,8 +120,9 @@ struct Recording {
 
 /// Reads a recording bit for bit. Drops unfinished rows at the end, which a dying process leaves. A child
 /// process reads the file under limits, so a damaged or hostile file neither crashes nor hangs the caller.
-/// Throws RecordingError; a recording of another format is rejected with the version that wrote it, and a file
-/// with links, external storage or other types than a recording has. Not RT-safe: forks and reads a file.
+/// Throws RecordingError; a recording of another format is rejected with the version that wrote it, and a
+/// file with links, external storage or other types than a recording has. Not RT-safe: forks and reads a
+/// file.
 Recording read_recording(const std::filesystem::path& file);
 
 }  // namespace wrenchd

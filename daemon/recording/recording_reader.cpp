@@ -15,9 +15,9 @@
 #include "daemon/recording/recording_stream.hpp"
 #include "files/opened_file.hpp"
 
-// libhdf5 is not made for hostile files: damaged ones crash it, or make it loop. So this process never gives it a
-// file that it did not write itself. A child reads the file once, under limits, and streams plain rows and texts
-// (daemon/README.md, "Recordings of others").
+// libhdf5 is not made for hostile files: damaged ones crash it, or make it loop. So this process never gives
+// it a file that it did not write itself. A child reads the file once, under limits, and streams plain rows
+// and texts (daemon/README.md, "Recordings of others").
 
 namespace wrenchd {
 namespace {
@@ -33,12 +33,14 @@ constexpr std::uint64_t kMemory_bytes = std::uint64_t{512} << 20;
 constexpr std::uint64_t kMaxExpansion = 1032;
 constexpr std::uint64_t kTexts_bytes = std::uint64_t{1} << 20;
 
-/// The bytes of an open file. The copy is private: a change of the file by another program may or may not show.
+/// The bytes of an open file. The copy is private: a change of the file by another program may or may not
+/// show.
 class MappedFile {
  public:
   explicit MappedFile(const OpenedFile& file) : size_(file.size_bytes()) {
     if (size_ == 0) return;
-    void* const at = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_NORESERVE, file.fd(), 0);
+    void* const at =
+        ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_NORESERVE, file.fd(), 0);
     if (at != MAP_FAILED) at_ = static_cast<const char*>(at);
   }
   ~MappedFile() {
@@ -75,7 +77,8 @@ Recording read_recording(const std::filesystem::path& file) {
                          "first ('wrenchctl record stop')");
   const std::uint64_t bytes = opened.size_bytes();
   const MappedFile mapped(opened);
-  if (!mapped.ok()) throw RecordingError(file.string() + ": cannot be read; it needs more memory than there is");
+  if (!mapped.ok())
+    throw RecordingError(file.string() + ": cannot be read; it needs more memory than there is");
   RecordingDecoder decoder(file.string(), kTexts_bytes + bytes * kMaxExpansion);
   ChildLimits limits;
   limits.cpu_s = kCpu_s + static_cast<double>(bytes) / kCpu_bytes_per_s;
@@ -96,8 +99,7 @@ Recording read_recording(const std::filesystem::path& file) {
         return decoder.feed(part);
       });
   if (end.out_of_time)
-    throw RecordingError(file.string() +
-                         ": is damaged: reading it does not end; use a complete copy");
+    throw RecordingError(file.string() + ": is damaged: reading it does not end; use a complete copy");
   if (!decoder.complete())
     throw RecordingError(file.string() + ": is damaged: reading it made libhdf5 fail" +
                          (end.signal != 0 ? " (signal " + std::to_string(end.signal) + ")" : "") +

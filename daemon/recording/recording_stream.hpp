@@ -15,8 +15,8 @@
 namespace wrenchd {
 
 // A recording as a stream of plain frames. The child process that reads an HDF5 file with libhdf5 writes the
-// stream; the process that wants the recording decodes it. The decoder trusts nothing: a hostile file may have
-// taken over the child.
+// stream; the process that wants the recording decodes it. The decoder trusts nothing: a hostile file may
+// have taken over the child.
 //
 //   frame: u8 kind, u32 length, `length` bytes. Texts and tables may come in several frames.
 
@@ -72,7 +72,8 @@ class RecordingEncoder {
 class RecordingDecoder {
  public:
   /// name: file name for messages. max_bytes: largest total size of the stream.
-  RecordingDecoder(std::string name, std::uint64_t max_bytes) : name_(std::move(name)), max_bytes_(max_bytes) {}
+  RecordingDecoder(std::string name, std::uint64_t max_bytes)
+      : name_(std::move(name)), max_bytes_(max_bytes) {}
 
   /// Takes the next bytes of the stream. Returns false after the last frame. Throws RecordingError if the
   /// stream is invalid or reports an error.

@@ -502,12 +502,13 @@ TEST_CASE("the name of a profile has only letters, digits, -, _ and dots", "[pro
     return load_profile(directory.write("p.toml", text));
   };
   CHECK(load("Arm-2.b_c").name == "Arm-2.b_c");
-  for (const char* name : {R"(arm\nACTION==\"add\", RUN+=\"/bin/sh\")", "a b", R"(a\u001b[31m)", "a/b",
-                           "a\u00e9", R"(a\"b)"}) {
+  for (const char* name :
+       {R"(arm\nACTION==\"add\", RUN+=\"/bin/sh\")", "a b", R"(a\u001b[31m)", "a/b", "a\u00e9", R"(a\"b)"}) {
     INFO(name);
     CHECK_THROWS_WITH(load(name), Catch::Contains("is not a valid name"));
   }
-  CHECK_THROWS_WITH(load(std::string(kMaxProfileName_bytes + 1, 'a')), Catch::Contains("is not a valid name"));
+  CHECK_THROWS_WITH(load(std::string(kMaxProfileName_bytes + 1, 'a')),
+                    Catch::Contains("is not a valid name"));
 }
 
 }  // namespace wrenchd

@@ -66,7 +66,8 @@ TEST_CASE("a limited scope includes only files beneath its directories, by name"
   CHECK(scope.includes("/etc/wrenchd/scenes/a.toml"));
   CHECK(scope.includes("/etc/wrenchd/scenes/../a.toml"));
   CHECK(scope.includes("/usr/share/wrenchd/a.toml"));
-  for (const char* outside : {"/etc/shadow", "/etc/wrenchd/../shadow", "/etc/wrenchdx/a", "/etc/wrenchd", "/", ""})
+  for (const char* outside :
+       {"/etc/shadow", "/etc/wrenchd/../shadow", "/etc/wrenchdx/a", "/etc/wrenchd", "/", ""})
     CHECK_FALSE(scope.includes(outside));
   CHECK_FALSE(scope.includes(std::string("/etc/wrenchd/a\0b", 16)));
   CHECK(FileScope().includes("/etc/shadow"));

@@ -260,6 +260,21 @@ Seeds request_seeds() {
   return seeds;
 }
 
+/// Streams with one frame of each kind: kind, length of 32 bits, content.
+Seeds recording_seeds() {
+  Seeds seeds;
+  const auto frame = [](char kind, const std::string& content) {
+    const auto length = static_cast<char>(content.size());
+    return std::string{kind, length, '\0', '\0', '\0'} + content;
+  };
+  constexpr char kError = 1, kNewFile = 12, kRole = 13, kEnd = 20;
+  const std::string end = frame(kEnd, "");
+  for (char kind = kError; kind <= kEnd; ++kind) seeds.inputs.push_back('\x7f' + frame(kind, "text") + end);
+  seeds.inputs.push_back('\x7f' + frame(kNewFile, "") + frame(kRole, "tool") + end);
+  seeds.words.insert(end);
+  return seeds;
+}
+
 Seeds seeds_of(const std::string& target) {
   if (target == "fuzz_events") return event_seeds();
   if (target == "fuzz_request") return request_seeds();
@@ -267,6 +282,7 @@ Seeds seeds_of(const std::string& target) {
   if (target == "fuzz_report") return report_seeds();
   if (target == "fuzz_report_descriptor") return descriptor_seeds();
   if (target == "fuzz_mesh") return mesh_seeds();
+  if (target == "fuzz_recording") return recording_seeds();
   return {};  // no initial corpus
 }
 

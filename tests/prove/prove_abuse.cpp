@@ -130,8 +130,34 @@ void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
   while (wanted && fd && send_bytes(fd.get(), line)) drain(fd.get());
 }
 
-constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
-                                          endless_line,    connects,    asks_for_all};
+/// Requests descriptors on many connections, and receives none of them.
+void hoards_descriptors(const fs::path& path, const std::atomic<bool>& wanted) {
+  const std::string line = request("state.open") + request("scene.geometry");
+  while (wanted) {
+    std::vector<OwnedFd> kept;
+    for (int i = 0; i < 31 && wanted; ++i) {
+      kept.push_back(connected(path));
+      for (int k = 0; k < 20 && kept.back() && send_bytes(kept.back().get(), line); ++k) {
+      }
+    }
+    for (int i = 0; i < 100 && wanted; ++i) std::this_thread::sleep_for(1ms);
+  }
+}
+
+/// Keeps the queue of slow work full.
+void fills_queue(const fs::path& path, const std::atomic<bool>& wanted) {
+  while (wanted) {
+    std::vector<OwnedFd> kept;
+    for (int i = 0; i < 20 && wanted; ++i) {
+      kept.push_back(connected(path));
+      if (kept.back()) send_bytes(kept.back().get(), request("scene.get") + request("devices"));
+    }
+    for (int i = 0; i < 5 && wanted; ++i) std::this_thread::sleep_for(1ms);
+  }
+}
+
+constexpr std::array<Abuse, 8> kAbuses = {floods_requests, never_reads,  floods_rubbish,     endless_line,
+                                          connects,        asks_for_all, hoards_descriptors, fills_queue};
 
 /// Runs the abusers in a separate process.
 class Abusers {

@@ -15,19 +15,26 @@ namespace wrenchd::test {
 namespace {
 
 /// Signatures of HDF5 structures, and names in the file: near them are sizes, addresses and counts.
-constexpr std::array<std::string_view, 12> kMarks = {"TREE", "SNOD", "HEAP", "GCOL", "OCHK", "OHDR",
+constexpr std::array<std::string_view, 12> kMarks = {"TREE", "SNOD", "HEAP",  "GCOL",     "OCHK",     "OHDR",
                                                      "FRHP", "BTHD", "ticks", "contacts", "settings", "tool"};
 
 std::vector<std::size_t> marks_in(const std::string& bytes) {
   std::vector<std::size_t> at = {0};
   for (const std::string_view mark : kMarks)
-    for (std::size_t i = bytes.find(mark); i != std::string::npos; i = bytes.find(mark, i + 1)) at.push_back(i);
+    for (std::size_t i = bytes.find(mark); i != std::string::npos; i = bytes.find(mark, i + 1))
+      at.push_back(i);
   return at;
 }
 
 void put_number(std::string& bytes, std::size_t at, std::size_t size, RandomValues& random) {
-  const std::array<std::uint64_t, 8> extremes = {
-      0, 1, ~std::uint64_t{0}, std::uint64_t{1} << 31, std::uint64_t{1} << 62, bytes.size(), at, random.bits()};
+  const std::array<std::uint64_t, 8> extremes = {0,
+                                                 1,
+                                                 ~std::uint64_t{0},
+                                                 std::uint64_t{1} << 31,
+                                                 std::uint64_t{1} << 62,
+                                                 bytes.size(),
+                                                 at,
+                                                 random.bits()};
   const std::uint64_t number = extremes[random.bits() % extremes.size()];
   for (std::size_t i = 0; i < size && at + i < bytes.size(); ++i)
     bytes[at + i] = static_cast<char>(number >> (8 * i));
@@ -91,8 +98,8 @@ std::string mutate(const std::string& good, RandomValues& random) {
         break;
       case 4: {  // a part of the file over another part
         const std::size_t from = random.bits() % bytes.size();
-        const std::size_t count = std::min({std::size_t{1} + random.bits() % 256, bytes.size() - at,
-                                            bytes.size() - from});
+        const std::size_t count =
+            std::min({std::size_t{1} + random.bits() % 256, bytes.size() - at, bytes.size() - from});
         bytes.replace(at, count, bytes.substr(from, count));
         break;
       }

@@ -51,7 +51,8 @@ TEST_CASE(
 }
 
 TEST_CASE("a profile whose name would become a rule is refused", "[udev_rules]") {
-  for (const char* name : {"arm\nACTION==\"add\", RUN+=\"/bin/sh\"", "arm\r", "a b", "a\"b", "#", "a/b", ""}) {
+  for (const char* name :
+       {"arm\nACTION==\"add\", RUN+=\"/bin/sh\"", "arm\r", "a b", "a\"b", "#", "a/b", ""}) {
     INFO(name);
     CHECK_THROWS_AS(udev_rules(std::vector{profile(name, Transport::hidraw, {{0x16c0, 0x0486}})}),
                     std::invalid_argument);

@@ -15,8 +15,8 @@ struct TcpEnd {
   std::uint16_t port = 0;     ///< in host byte order
 };
 
-/// Returns the user of the socket with this local end and this remote end, from a table as in /proc/net/tcp or
-/// /proc/net/tcp6. Returns nothing unless the connection is established and a process holds the socket: a
+/// Returns the user of the socket with this local end and this remote end, from a table as in /proc/net/tcp
+/// or /proc/net/tcp6. Returns nothing unless the connection is established and a process holds the socket: a
 /// closed socket counts as root's in the table. Not RT-safe: reads a file.
 std::optional<uid_t> owner_in(std::istream& table, const TcpEnd& local, const TcpEnd& remote);
 

@@ -7,8 +7,8 @@
 namespace wrenchd {
 
 /// A local HTML file that redirects a browser to an address. Only its owner can read the file, so the address
-/// does not appear on a command line, which every user can read. The destructor removes the file. Not RT-safe:
-/// writes a file.
+/// does not appear on a command line, which every user can read. The destructor removes the file. Not
+/// RT-safe: writes a file.
 class RedirectPage {
  public:
   /// Writes the file in XDG_RUNTIME_DIR, or in a new directory of its own if that is not a directory of this

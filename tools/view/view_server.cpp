@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include <arpa/inet.h>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -19,7 +20,6 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
-#include <arpa/inet.h>
 #include <sys/random.h>
 #include <unistd.h>
 

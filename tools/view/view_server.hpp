@@ -13,8 +13,8 @@ class LiveFeed;
 class RecordedFeed;
 
 /// Serves the view's page to browsers on this machine, and its data over a WebSocket. Listens only on
-/// 127.0.0.1, and serves only processes of its own user and of root. Rejects requests without the token in the
-/// address, and requests from other web pages (Host and Origin). Runs on the thread that calls run().
+/// 127.0.0.1, and serves only processes of its own user and of root. Rejects requests without the token in
+/// the address, and requests from other web pages (Host and Origin). Runs on the thread that calls run().
 ///
 ///   http://127.0.0.1:PORT/TOKEN/         the page and its files
 ///   ws://127.0.0.1:PORT/TOKEN/live       messages: JSON, and binary ones for meshes and curves

@@ -597,7 +597,8 @@ TEST_CASE("a slow method blocks no other client, and its response follows when i
   for (std::size_t i = 0; i < WorkerQueue::kMaxQueuedPerUser + 2; ++i) {
     others.push_back(rig.connect(TestUser::observer));
     others.back().send(request("test.wait", "{}", "\"w\""));
-    if (i >= WorkerQueue::kMaxQueuedPerUser) CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
+    if (i >= WorkerQueue::kMaxQueuedPerUser)
+      CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
     CHECK(others.back().error_code("status") == 0);
   }
   others.front().disconnect();
@@ -637,7 +638,10 @@ bool receives_descriptor(RigClient& client, const std::string& method) {
 
 /// Hands over a descriptor. slow: through the worker.
 MethodRow opens(const std::string& name, bool slow) {
-  return {name, Role::observer, {}, "Hands over a descriptor.",
+  return {name,
+          Role::observer,
+          {},
+          "Hands over a descriptor.",
           [](const Json&, const Caller&) {
             return MethodResult(Json{{"open", true}}, OwnedFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)));
           },
@@ -675,8 +679,10 @@ TEST_CASE("clients that do not read descriptors use up neither the daemon's nor 
 }
 
 TEST_CASE("a reply whose descriptor cannot be made is an error", "[control_socket]") {
-  const MethodRow stale{"test.stale", Role::observer, {}, "Hands over a closed descriptor.",
-                        [](const Json&, const Caller&) { return MethodResult(Json{{"open", true}}, 1'000'000); }};
+  const MethodRow stale{
+      "test.stale", Role::observer, {}, "Hands over a closed descriptor.", [](const Json&, const Caller&) {
+        return MethodResult(Json{{"open", true}}, 1'000'000);
+      }};
   ControlRig rig(resting_config(), {stale});
   RigClient client = rig.connect(TestUser::observer);
   CHECK(client.error_code("test.stale") == code_of(RpcCode::internal_error));
@@ -686,7 +692,10 @@ TEST_CASE("the slow requests of one user delay those of another by one task", "[
   std::atomic<int> ran{0};
   std::atomic<bool> go{false};
   std::atomic<int> turn_of_other{-1};
-  const MethodRow wait{"test.wait", Role::observer, {}, "Takes a while.",
+  const MethodRow wait{"test.wait",
+                       Role::observer,
+                       {},
+                       "Takes a while.",
                        [&](const Json&, const Caller& caller) {
                          while (!go) std::this_thread::sleep_for(1ms);
                          const int turn = ran++;

@@ -126,8 +126,7 @@ TEST_CASE("an operator loads only scenes and meshes beneath the directories of s
   const auto load = [&](const fs::path& file) {
     return a.rejected("scene.load", {{"file", file.string()}}, Role::operator_);
   };
-  const fs::path next =
-      p.files.write("scenes/next.toml", "[tool]\nmesh = \"cube.off\"\nscale = 0.001\n");
+  const fs::path next = p.files.write("scenes/next.toml", "[tool]\nmesh = \"cube.off\"\nscale = 0.001\n");
   CHECK_NOTHROW(a.ask("scene.load", {{"file", next.string()}}, Role::operator_));
   CHECK_NOTHROW(a.ask("scene.load", {{"file", "scenes/cube_over_plunger.toml"}}, Role::operator_));
 
@@ -207,8 +206,7 @@ TEST_CASE("a recording contains the bytes that were loaded, whatever their names
   CHECK(a.s.runtime.recording_header().scene == scene_text);
   // An operator adds and removes an obstacle, which builds the scene again.
   p.files.write("scenes/post.off", cube);
-  const Json post = {
-      {"obstacle", {{"mesh", "post.off"}, {"scale", 0.001}, {"position_m", {0.0, 0.3, 0.0}}}}};
+  const Json post = {{"obstacle", {{"mesh", "post.off"}, {"scale", 0.001}, {"position_m", {0.0, 0.3, 0.0}}}}};
   const Json added = a.ask("scene.add", post, Role::operator_);
   CHECK(mesh_in("tool") == cube);
   CHECK(mesh_in("obstacle_0") == cube);
@@ -224,7 +222,9 @@ TEST_CASE("the event of a rejected reload, which every observer receives, quotes
   EventFeed feed(a.s.runtime.loop());
   const fs::path bad = p.files.write("scenes/bad.toml", "root:x:0:0\n");
   CHECK_THROWS_AS(reload_config(a.s.runtime.reconfigurator(), feed,
-                                [&]() -> RunConfig { return load_run_config({bad, {}, {}, false}, SearchPath()); }),
+                                [&]() -> RunConfig {
+                                  return load_run_config({bad, {}, {}, false}, SearchPath());
+                                }),
                   ConfigError);
   const EventFeed::Batch events = feed.events_since(0, {"reload"}, 1 << 20);
   REQUIRE(events.lines.size() == 1);

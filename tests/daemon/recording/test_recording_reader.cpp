@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <atomic>
-#include <cstdlib>
 #include <csignal>
+#include <cstdlib>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -21,7 +21,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// Recordings of strangers. Libhdf5 follows links, reads external files, and crashes or loops on damaged files.
+// Recordings of strangers. Libhdf5 follows links, reads external files, and crashes or loops on damaged
+// files.
 
 namespace wrenchd {
 namespace {
@@ -65,7 +66,8 @@ void put_text(hid_t group, const char* name, const std::string& text, hid_t layo
   H5Dclose(set), H5Sclose(space), H5Tclose(type);
 }
 
-TEST_CASE("a recording that refers to other files is rejected, and quotes none of them", "[recording][hostile]") {
+TEST_CASE("a recording that refers to other files is rejected, and quotes none of them",
+          "[recording][hostile]") {
   const TemporaryDirectory directory;
   const fs::path secret = directory.write("secret", "root:x:0:0 top secret");
   Changed changed(directory.path());
@@ -199,14 +201,14 @@ TEST_CASE("the stream of a child that a hostile file has taken over is checked",
     return decoder.take();
   };
   CHECK(decode(end).ticks.empty());
-  CHECK_THROWS_AS(decode(""), RecordingError);                                          // no end
-  CHECK_THROWS_AS(decode(frame(77, "") + end), RecordingError);                         // no such kind
+  CHECK_THROWS_AS(decode(""), RecordingError);                   // no end
+  CHECK_THROWS_AS(decode(frame(77, "") + end), RecordingError);  // no such kind
   CHECK_THROWS_AS(decode(frame(kind(FrameKind::ticks), "half a row") + end), RecordingError);
   CHECK_THROWS_AS(decode(frame(kind(FrameKind::file_role), "tool") + end), RecordingError);  // no file yet
   CHECK_THROWS_AS(decode(std::string("\x01\xff\xff\xff\xff", 5)), RecordingError);           // 4 GiB
-  CHECK_THROWS_AS(decode(frame(kind(FrameKind::new_file), "") +
-                         frame(kind(FrameKind::file_role), "../../evil") + end),
-                  RecordingError);
+  CHECK_THROWS_AS(
+      decode(frame(kind(FrameKind::new_file), "") + frame(kind(FrameKind::file_role), "../../evil") + end),
+      RecordingError);
   RecordingDecoder small("run.h5", 10);
   CHECK_THROWS_AS(small.feed(frame(kind(FrameKind::settings), "eleven bytes")), RecordingError);
   CHECK_THROWS_WITH(decode(frame(kind(FrameKind::error), "is \x1b[31mbad")), Catch::Contains("is ?[31mbad"));
@@ -219,7 +221,8 @@ TEST_CASE("the stream of a child that a hostile file has taken over is checked",
   CHECK(recording.contacts_of(0).empty());
 }
 
-TEST_CASE("a child that crashes, loops, opens files or fills the memory does no harm", "[recording][hostile]") {
+TEST_CASE("a child that crashes, loops, opens files or fills the memory does no harm",
+          "[recording][hostile]") {
   using Write = std::function<void(std::string_view)>;
   std::string got;
   const auto run = [&got](const std::function<void(const Write&)>& work) {

@@ -47,9 +47,9 @@ TEST_CASE("the user of a connection is that of its row with both ends", "[view]"
 
 TEST_CASE("a socket that its process has closed has no owner, although the table says root", "[view]") {
   const std::string peer = "0100007F:9C40", own = "0100007F:1F51";
-  CHECK_FALSE(owner(row(peer, own, "01", 0, 0)).has_value());   // no inode
-  CHECK_FALSE(owner(row(peer, own, "05", 0, 0)).has_value());   // FIN_WAIT2
-  CHECK_FALSE(owner(row(peer, own, "06", 0, 0)).has_value());   // TIME_WAIT
+  CHECK_FALSE(owner(row(peer, own, "01", 0, 0)).has_value());  // no inode
+  CHECK_FALSE(owner(row(peer, own, "05", 0, 0)).has_value());  // FIN_WAIT2
+  CHECK_FALSE(owner(row(peer, own, "06", 0, 0)).has_value());  // TIME_WAIT
   CHECK_FALSE(owner(row(peer, own, "08", 1001, 77)).has_value());
 }
 
@@ -68,7 +68,8 @@ TEST_CASE("the kernel's table names this user for a connection of this process",
   sockaddr_in peer{};
   length = sizeof peer;
   REQUIRE(::getpeername(accepted.get(), reinterpret_cast<sockaddr*>(&peer), &length) == 0);
-  const TcpEnd peer_end{peer.sin_addr.s_addr, ntohs(peer.sin_port)}, own_end{at.sin_addr.s_addr, ntohs(at.sin_port)};
+  const TcpEnd peer_end{peer.sin_addr.s_addr, ntohs(peer.sin_port)},
+      own_end{at.sin_addr.s_addr, ntohs(at.sin_port)};
   CHECK(connection_owner(peer_end, own_end) == geteuid());
   client.reset();
   CHECK_FALSE(connection_owner(peer_end, own_end).has_value());
