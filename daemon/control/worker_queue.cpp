@@ -44,8 +44,8 @@ std::function<void()> WorkerQueue::take_next() {
   queue_.erase(next);
   last_turns_[user] = ++turn_;
   std::erase_if(last_turns_, [&](const auto& entry) {
-    return entry.first != user && std::none_of(queue_.begin(), queue_.end(), [&entry](const Task& task) {
-             return task.user == entry.first;
+    return entry.first != user && std::none_of(queue_.begin(), queue_.end(), [&entry](const Task& queued) {
+             return queued.user == entry.first;
            });
   });
   return task;
