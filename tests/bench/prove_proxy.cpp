@@ -81,7 +81,7 @@ Bodies bodies_of(const ManipulationCase& handling, const ObstacleMotion& motion)
 struct Cage {
   std::string name;
   GeneratedMesh tool, shell;
-  double scale;  ///< of the shell
+  double scale;  ///< factor on the size of the shell
 };
 
 const std::vector<Cage>& cages() {
