@@ -87,13 +87,15 @@ LinkStatus LatestWriter::submit(TimePoint now, std::span<const std::uint8_t> rep
 }
 
 bool LatestWriter::close() noexcept {
+  if (!thread_.joinable()) return written_;  // a second call, such as the destructor's, does not wait again
   shared_->closing.store(true, std::memory_order_release);
   shared_->wake.wake();
   std::unique_lock lock(shared_->mutex);
   const bool ended = shared_->changed.wait_for(lock, close_timeout_, [this] { return shared_->ended; });
   lock.unlock();
-  if (thread_.joinable()) ended ? thread_.join() : thread_.detach();
-  return ended && shared_->last_ok;
+  ended ? thread_.join() : thread_.detach();
+  written_ = ended && shared_->last_ok;
+  return written_;
 }
 
 const WriteSlot& LatestWriter::slot() const noexcept {

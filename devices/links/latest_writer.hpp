@@ -42,7 +42,8 @@ class LatestWriter {
   ///
   /// If the kernel does not return from a write in this time, close() detaches the thread. The thread writes
   /// the last report as soon as it can and then ends. close() then returns false, and also if the last write
-  /// failed. No other thread may call submit() any more. Not RT-safe: waits.
+  /// failed. A second call returns the same result at once. No other thread may call submit() any more. Not
+  /// RT-safe: waits.
   bool close() noexcept;
 
   /// False if the kernel rejected the requested real-time priority; then raise the rtprio limit.
@@ -56,6 +57,7 @@ class LatestWriter {
   std::thread thread_;
   Duration close_timeout_;
   bool priority_granted_ = true;
+  bool written_ = true;  ///< result of close()
 };
 
 /// Sets a thread to SCHED_FIFO with this priority; 0 leaves the thread unchanged. Returns false if the kernel
