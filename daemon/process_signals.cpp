@@ -23,8 +23,8 @@ namespace {
 /// Longest wait for the servo thread to release the hand. A loop that does not tick in this time hangs; then
 /// the writer thread of the link has sent a zero wrench (devices/links/host_watchdog.hpp).
 constexpr long kReleaseWithin_us = 100'000;
-/// Time between two requests to release. The loop ticks once a millisecond, as configured by default.
-constexpr long kRequestPeriod_us = 200;
+/// Time between two looks at the loop. It ticks once a millisecond, as configured by default.
+constexpr long kPollPeriod_us = 200;
 /// A thread of the link writes the zero wrench of a release. A process that ends leaves it this time.
 constexpr long kWriteTime_us = 50'000;
 
@@ -99,13 +99,13 @@ void release_hand_before_exit() noexcept {
     const bool no_tick_runs = thread == 0 || thread == ::gettid();
     if (no_tick_runs && !released()) loop.release(std::chrono::steady_clock::now());
     if (no_tick_runs) return sleep_us(kWriteTime_us);
-    // The stop removes the force in the next tick, whatever the state; then the loop can end at once. The
-    // request is repeated, because a loop that ticks on takes the device for a new one.
+    // The stop removes the force in the next tick, whatever the state; then the loop can end at once. It is
+    // requested for good, because a loop that ticks on would take the device for a new one and test it.
+    loop.requests().request_for_good(kStop | kQuit);
     for (long us = 0, since_release_us = 0; us < kReleaseWithin_us && since_release_us < kWriteTime_us;
-         us += kRequestPeriod_us) {
-      if (since_release_us > 0 || released()) since_release_us += kRequestPeriod_us;
-      loop.requests().request(kStop | kQuit);
-      sleep_us(kRequestPeriod_us);
+         us += kPollPeriod_us) {
+      if (since_release_us > 0 || released()) since_release_us += kPollPeriod_us;
+      sleep_us(kPollPeriod_us);
     }
   });
 }

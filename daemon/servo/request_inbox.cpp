@@ -14,8 +14,8 @@ std::optional<T> newest(LatestValue<T>& value) noexcept {
 }  // namespace
 
 Requests RequestInbox::take() noexcept {
-  return {commands_.exchange(kNoCommand, std::memory_order_relaxed), newest(workspace_),
-          newest(local_models_), newest(limits_)};
+  return {commands_.exchange(held_.load(std::memory_order_relaxed), std::memory_order_relaxed),
+          newest(workspace_), newest(local_models_), newest(limits_)};
 }
 
 }  // namespace wrenchd

@@ -30,6 +30,11 @@ class RequestInbox {
  public:
   /// Requests these commands for the next tick.
   void request(CommandSet commands) noexcept { commands_.fetch_or(commands, std::memory_order_relaxed); }
+  /// Requests these commands for the next tick and for every later one: the process is about to end.
+  void request_for_good(CommandSet commands) noexcept {
+    held_.fetch_or(commands, std::memory_order_relaxed);
+    request(commands);
+  }
   /// Arms on behalf of the process itself: no heartbeat is needed.
   void arm() noexcept { request(kArm); }
   /// Arms on behalf of a client that calls heartbeat() at least every 100 ms from now on.
@@ -63,6 +68,7 @@ class RequestInbox {
 
  private:
   std::atomic<CommandSet> commands_{kNoCommand};
+  std::atomic<CommandSet> held_{kNoCommand};  ///< requested for every tick
   LatestValue<WorkspaceRequest> workspace_;
   LatestValue<LocalModelSet> local_models_;
   LatestValue<LimitSettings> limits_;

@@ -173,13 +173,16 @@ TEST_CASE("a crash of another thread lets the servo thread release the hand", "[
     }
   });
   CHECK((WIFSIGNALED(status) && WTERMSIG(status) == SIGSEGV));
-  // A loop that ticks on after the release takes the device for a new one, which is disarmed.
+  // The loop ticks on, and never takes the device for a new one.
   bool released = false;
   StateRecord record;
   for (std::uint64_t i = before; i < run.records.written(); ++i) {
     REQUIRE(run.records.read(i, record));
     released = released || record.tick.released == 1;
-    if (released) REQUIRE(record.tick.F_out == TickRecord::Numbers6{});
+    if (!released) continue;
+    REQUIRE(static_cast<State>(record.tick.state) == State::shutdown);
+    REQUIRE(record.tick.released == 1);
+    REQUIRE(record.tick.F_out == TickRecord::Numbers6{});
   }
   CHECK(released);
 }
