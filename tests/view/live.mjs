@@ -73,16 +73,18 @@ test(async () => {
   // The page shows that the daemon has ended, and shows a restarted daemon again.
   const again = await open(server.url, small);
   await until("the page shows the daemon", async () => (await text(again, "state")) === "disarmed");
-  const armOnLink = again.evaluate(() => new Promise((seen) => {  // before any further picture
+  await again.evaluate(() => {  // whether Arm is disabled as soon as the loss is shown, before any further picture
     const shown = document.getElementById("state");
-    new MutationObserver(() => shown.textContent === "connection lost" && seen(document.getElementById("arm").disabled))
-      .observe(shown, { childList: true, characterData: true, subtree: true });
-  }));
+    window.armDisabledAtLoss = new Promise((seen) => {
+      new MutationObserver(() => shown.textContent === "connection lost" && seen(document.getElementById("arm").disabled))
+        .observe(shown, { childList: true, characterData: true, subtree: true });
+    });
+  });
   wrenchd.child.kill("SIGTERM");
   await wrenchd.ended;
   await until("the page says that it is gone", async () => (await text(again, "state")) === "connection lost");
   assert.match(await text(again, "banner-title"), /No connection to wrenchd/);
-  assert.equal(await armOnLink, true);
+  assert.equal(await again.evaluate(() => window.armDisabledAtLoss), true);
   await daemon();
   await until("it is back", async () => (await text(again, "state")) === "disarmed");
   assert.equal(await again.locator("#banner").isVisible(), false);
