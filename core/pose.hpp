@@ -11,6 +11,9 @@ namespace wrenchd {
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+// A program that disagrees with the library about Eigen's alignment reads other numbers than were written.
+static_assert(alignof(Quaterniond) == alignof(double),
+              "define EIGEN_DONT_VECTORIZE before Eigen is included; linking with wrenchd::core does it");
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 

@@ -109,8 +109,17 @@ T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large,
   return value;
 }
 
+void MeshLoader::add(const std::filesystem::path& name, PolygonSoup soup) {
+  added_[name] = std::make_shared<const PolygonSoup>(std::move(soup));
+}
+
 std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind,
                                                    const std::optional<GeneratedMesh>& made) {
+  if (const auto added = added_.find(file); added != added_.end()) {
+    auto& loaded = loaded_[{file, kind}];
+    if (!loaded) loaded = std::make_shared<const LoadedMesh>(check_added(*added->second, file, kind));
+    return with_changes(loaded, kind);
+  }
   std::error_code error;
   const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
   auto& loaded = loaded_[{error || made ? file : same, kind}];
@@ -242,6 +251,13 @@ LoadedMesh MeshLoader::make(const GeneratedMesh& made, const std::filesystem::pa
     for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
     return repair_and_check(std::move(soup), name, kind);
   });
+  loaded.file = name;
+  return loaded;
+}
+
+LoadedMesh MeshLoader::check_added(const PolygonSoup& soup, const std::filesystem::path& name,
+                                   BodyKind kind) {
+  LoadedMesh loaded = repair_and_check(soup, name, kind);
   loaded.file = name;
   return loaded;
 }

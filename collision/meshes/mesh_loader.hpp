@@ -52,6 +52,9 @@ class MeshLoader {
   MeshLoader(std::filesystem::path cache, Progress progress)
       : cache_(std::move(cache)), progress_(std::move(progress)) {}
 
+  /// Makes load() use these polygons under this name, in place of a file. For meshes of programs.
+  void add(const std::filesystem::path& name, PolygonSoup soup);
+
   /// Returns the mesh of a file, or a generated mesh if `generated` is given; `file` is then its name
   /// (generated_mesh_name()). Throws MeshError that names the file, the defect, its place and the remedy.
   std::shared_ptr<const LoadedMesh> load(const std::filesystem::path& file, BodyKind kind,
@@ -87,6 +90,7 @@ class MeshLoader {
  private:
   LoadedMesh read(const std::filesystem::path& file, BodyKind kind);
   LoadedMesh make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind);
+  LoadedMesh check_added(const PolygonSoup& soup, const std::filesystem::path& name, BodyKind kind);
   LoadedMesh repair_and_check(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const;
   LoadedMesh join_parts(std::vector<MeshSource> sources, BodyKind kind) const;
   std::shared_ptr<const LoadedMesh> with_changes(const std::shared_ptr<const LoadedMesh>& loaded,
@@ -101,6 +105,8 @@ class MeshLoader {
   std::vector<std::string> changes_;
   std::vector<std::string> simplifications_;
   std::vector<std::string> warnings_;
+  std::map<std::filesystem::path, std::shared_ptr<const PolygonSoup>>
+      added_;  ///< meshes of programs, by name
   std::map<std::pair<std::filesystem::path, BodyKind>, std::shared_ptr<const LoadedMesh>> loaded_;
 };
 

@@ -20,7 +20,7 @@
 #include "daemon/option_checks.hpp"
 #include "tools/commands/subcommand.hpp"
 #include "tools/output_file.hpp"
-#include "tools/solve.hpp"
+#include "tools/solve_table.hpp"
 
 namespace wrenchd {
 namespace {
@@ -117,12 +117,10 @@ class SolveCommand final : public Subcommand {
 
  private:
   void add_proxy_options(CLI::App& solve) {
-    auto* proxy = solve.add_flag("--proxy", settings_.proxy,
+    auto* proxy = solve.add_flag("--proxy", proxy_,
                                  "follow the poses as a trajectory, as the daemon does: each answer starts\n"
                                  "from the previous one and never enters or crosses an obstacle");
-    solve
-        .add_option("--rate", settings_.rate_Hz,
-                    "rate of the trajectory [Hz], which sets the motion of obstacles")
+    solve.add_option("--rate", rate_Hz_, "rate of the trajectory [Hz], which sets the motion of obstacles")
         ->check(number_in_range(0.001, 1e6))
         ->needs(proxy)
         ->capture_default_str();
@@ -140,15 +138,20 @@ class SolveCommand final : public Subcommand {
     for (const std::string& change : meshes.changes()) print_note(change);
     const std::vector<Pose> poses = read_poses_from(poses_);
     SolveSettings settings = settings_;
-    if (scene.has_moving_obstacles() && !settings.proxy)
+    if (scene.has_moving_obstacles() && !proxy_)
       print_note("the obstacles move, but every pose is solved at scene time 0; use --proxy to move them");
     settings.depth.method = kMethods.at(method_);
     settings.depth.friction = parse_friction(friction_).value();
     settings.depth.contacts = contacts_ == "cgal" ? ContactBackend::cgal : ContactBackend::native;
     settings.law = law_ == "energy" ? SpringLaw::energy : SpringLaw::pid;
-    const std::vector<SolvedPose> rows = solve(scene, poses, settings);
+    PoseSolver solver(scene, settings);
+    std::vector<SolvedPose> rows;
+    if (proxy_)
+      rows = solver.follow(poses, rate_Hz_);
+    else
+      for (const Pose& X_WM : poses) rows.push_back(solver.project(X_WM));
     std::ostringstream text;
-    write_csv(text, rows, settings.proxy);
+    write_csv(text, rows, proxy_);
     write_output(output_, text.str());
     return report_infeasible(rows);
   }
@@ -173,6 +176,8 @@ class SolveCommand final : public Subcommand {
   std::string contacts_ = "native";
   std::string friction_ = "0,0";
   SolveSettings settings_;
+  bool proxy_ = false;  ///< follow the poses as a trajectory
+  double rate_Hz_ = 1000.0;
 };
 
 }  // namespace

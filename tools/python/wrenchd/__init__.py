@@ -1,19 +1,45 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Client of the haptic servo daemon wrenchd: reads its state at the rate of its servo loop, and sends requests.
+"""The haptic servo daemon wrenchd in Python: a client of the daemon, and its contact engine as a library.
+
+The client reads the daemon's state at the rate of its servo loop, and sends requests. It needs only the standard library;
+if numpy is installed, State.array() returns numpy arrays.
 
     client = wrenchd.Client()
     print(client.status()["state"])
     for tick in client.open_state().ticks(1000):
         print(tick.tick, tick.F_out, tick.contact_list)
 
-Requires only the standard library. If numpy is installed, State.array() returns numpy arrays.
+The engine computes penetration depth, clearance and contacts of meshes without a daemon (wrenchd.engine). It needs numpy.
+
+    scene = wrenchd.Scene(tool=wrenchd.Mesh.load("peg.stl", scale=1e-3), obstacles=[wrenchd.HalfSpace()])
+    print(scene.project([0, 0, 0.01, 0, 0, 0, 1]).energy)
 """
+
+from typing import TYPE_CHECKING, Any
 
 from .client import Client, Lease, default_sockets
 from .errors import Disconnected, NoDaemon, ProtocolError, Rejected, Timeout, WrenchdError
 from .state import Contact, State, Tick
 
+if TYPE_CHECKING:
+    from .engine import Body, HalfSpace, Mesh, MeshError, MeshReport, Projection, Projections, Scene
+
+_ENGINE = ("Body", "HalfSpace", "Mesh", "MeshError", "MeshReport", "Projection", "Projections", "Scene")
+
 __all__ = [
-    "Client", "Contact", "Disconnected", "Lease", "NoDaemon", "ProtocolError", "Rejected", "State", "Tick", "Timeout",
-    "WrenchdError", "default_sockets",
+    "Body", "Client", "Contact", "Disconnected", "HalfSpace", "Lease", "Mesh", "MeshError", "MeshReport", "NoDaemon",
+    "Projection", "Projections", "ProtocolError", "Rejected", "Scene", "State", "Tick", "Timeout", "WrenchdError",
+    "default_sockets",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Loads the engine when it is first used, so that the client works without numpy and without the extension."""
+    if name not in _ENGINE:
+        raise AttributeError(f"module 'wrenchd' has no attribute {name!r}")
+    try:
+        from . import engine
+    except ImportError as error:
+        raise ImportError(f"wrenchd.{name} needs numpy and the compiled engine ({error}); install python3-wrenchd, or run "
+                          "'pip install ./tools/python' in a virtual environment") from error
+    return getattr(engine, name)
