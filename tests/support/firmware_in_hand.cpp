@@ -103,7 +103,8 @@ void FirmwareInHand::read_encoders() noexcept {
 
 bool FirmwareInHand::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
   CommandBytes command(bytes.begin(), bytes.end());
-  if (mistakes_.command) mistakes_.command(command);
+  ++commands_;
+  if (mistakes_.command) mistakes_.command(command, firmware_);
   return wf_take_command(&firmware_, clock_us(), command.data(), command.size());
 }
 

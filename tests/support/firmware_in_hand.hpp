@@ -25,9 +25,10 @@ void seal(std::span<std::uint8_t> report);
 /// The mistakes of a maker around the firmware core: changes of what goes into the core and what comes out of
 /// it. An empty function changes nothing.
 struct FirmwareMistakes {
-  std::function<void(ReportBytes&)> report;    ///< changes a report before it is sent
-  std::function<void(CommandBytes&)> command;  ///< changes a command before the core receives it
-  std::function<void(wf_wrench&)> wrench;      ///< changes the wrench between the core and the motors
+  std::function<void(ReportBytes&)> report;  ///< changes a report before it is sent
+  /// Changes a command, or the core, before the core receives the command.
+  std::function<void(CommandBytes&, wf_firmware&)> command;
+  std::function<void(wf_wrench&)> wrench;  ///< changes the wrench between the core and the motors
   /// Changes the clock of the motor context [us].
   std::function<std::uint32_t(std::uint32_t)> motor_clock;
 };
@@ -50,6 +51,7 @@ class FirmwareInHand final : public EmulatedDevice {
   /// Wrench of the motors on the hand, about the handle point, in B.
   const Wrench& motor_wrench() const noexcept { return handle_.motor_wrench(); }
   wf_firmware& firmware() noexcept { return firmware_; }
+  std::uint64_t commands() const noexcept { return commands_; }  ///< commands received, valid or not
   /// Largest force and torque of the motors since the start.
   double max_force_N() const noexcept { return max_force_N_; }
   double max_torque_Nm() const noexcept { return max_torque_Nm_; }
@@ -72,6 +74,7 @@ class FirmwareInHand final : public EmulatedDevice {
   bool powered_ = false;
   TimePoint power_on_{}, now_{};
   std::uint64_t substeps_ = 0;
+  std::uint64_t commands_ = 0;
   double max_force_N_ = 0.0, max_torque_Nm_ = 0.0;
 };
 
