@@ -151,8 +151,7 @@ class Conformance {
     throw std::runtime_error("the device stopped sending valid reports; check its power and its main loop");
   }
 
-  // --- identity
-  // ---------------------------------------------------------------------------------------------
+  // --- identity ------------------------------------------------------------
 
   void judge_identity() {
     if (device_ == nullptr || device_->report_descriptor.empty()) {
@@ -184,8 +183,7 @@ class Conformance {
     add("report_descriptor", wrong.empty(), wrong.empty() ? "declares both reports" : wrong, kUsbSection);
   }
 
-  // --- reports
-  // ----------------------------------------------------------------------------------------------
+  // --- reports ------------------------------------------------------------
 
   void listen() {
     session_.listen(kEarlierHost);
@@ -195,11 +193,13 @@ class Conformance {
     valid_.clear();
     for (const ReceivedReport& r : session_.reports())
       if (r.outcome == Decoding::ok) valid_.push_back(&r);
-    reports_valid_ = valid_.size() >= ProfileDevice::kTrustReports;
+    // A wrong checksum is right by chance in some reports. The link counts as lossy below the same share.
+    reports_valid_ =
+        valid_.size() >= ProfileDevice::kTrustReports && 3 * valid_.size() >= 2 * session_.reports().size();
     if (!reports_valid_) {
       for (const char* rule : {"unused_bits", "sequence", "device_time", "report_rate", "quaternion_norm",
                                "motors_off_at_start"})
-        skip(rule, "there are no valid reports", kPoseSection);
+        skip(rule, "too few reports are valid", kPoseSection);
       return;
     }
     judge_unused_bits();
@@ -300,15 +300,14 @@ class Conformance {
         rule_section(7));
   }
 
-  // --- velocity
-  // ---------------------------------------------------------------------------------------------
+  // --- velocity ------------------------------------------------------------
 
   void judge_motion() {
     const std::array<const char*, 3> rules = {"quaternion_order", "linear_velocity", "angular_velocity"};
     const bool linear = profile_.pose_report.linear_velocity.present;
     const bool angular = profile_.pose_report.angular_velocity.present;
     std::string why;
-    if (!reports_valid_) why = "there are no valid reports";
+    if (!reports_valid_) why = "too few reports are valid";
     if (why.empty() && !norm_works_) why = "the quaternion is not a unit quaternion";
     if (why.empty() && !linear && !angular) why = "the profile has no velocity; wrenchd estimates it";
     if (!why.empty()) {
@@ -407,8 +406,7 @@ class Conformance {
     return {};
   }
 
-  // --- commands
-  // ---------------------------------------------------------------------------------------------
+  // --- commands ------------------------------------------------------------
 
   static constexpr std::array<const char*, 15> kCommandRules = {
       "acknowledged",     "sequence_wraps",    "motors_follow_enable", "no_trip_at_enable_0", "watchdog",
@@ -540,8 +538,7 @@ class Conformance {
           tripped ? "`watchdog_tripped` is set" : "`watchdog_tripped` is not set", rule_section(7));
   }
 
-  // --- watchdog
-  // ---------------------------------------------------------------------------------------------
+  // --- watchdog ------------------------------------------------------------
 
   /// Switches the motors on with zero wrench, then sends nothing.
   WatchdogTrial stop_commands(double hold_s) {
@@ -626,8 +623,7 @@ class Conformance {
           rule_section(6));
   }
 
-  // --- commands that the firmware must reject
-  // -----------------------------------------------------------------
+  // --- commands that the firmware must reject ------------------------------------------------------------
 
   void judge_repetition() {
     if (!passed("watchdog")) {
@@ -710,8 +706,7 @@ class Conformance {
     if (!accepted) session_.set_sequence(session_.sequence() + 2000);
   }
 
-  // --- pulses
-  // -----------------------------------------------------------------------------------------------
+  // --- pulses ------------------------------------------------------------
 
   void judge_pulses() {
     const std::array<const char*, 2> rules = {"force_direction", "torque_direction"};
@@ -801,8 +796,7 @@ class Conformance {
         (end.rotation.normalized() * start.rotation.normalized().conjugate()).normalized());
   }
 
-  // --- the end
-  // ----------------------------------------------------------------------------------------------
+  // --- the end ------------------------------------------------------------
 
   void judge_release() {
     if (!trusted_) return;
@@ -823,7 +817,7 @@ class Conformance {
   std::vector<RuleResult> results_;
   /// Valid reports of listen(). The pointers are valid until the session is cleared.
   std::vector<const ReceivedReport*> valid_;
-  bool reports_valid_ = false;  ///< enough valid reports arrived in a row
+  bool reports_valid_ = false;  ///< enough reports of listen() were valid
   bool sequence_works_ = false;
   bool norm_works_ = false;
   bool trusted_ = false;
