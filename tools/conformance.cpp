@@ -139,11 +139,12 @@ class Conformance {
   void skip(std::string rule, std::string why, std::string section) {
     results_.push_back({std::move(rule), Judgement::not_judged, std::move(why), std::move(section)});
   }
-  bool passed(const std::string& rule) const {
-    return std::any_of(results_.begin(), results_.end(), [&rule](const RuleResult& r) {
-      return r.rule == rule && r.judgement == Judgement::pass;
-    });
+  bool has(const std::string& rule, Judgement judgement) const {
+    return std::any_of(results_.begin(), results_.end(),
+                       [&](const RuleResult& r) { return r.rule == rule && r.judgement == judgement; });
   }
+  bool passed(const std::string& rule) const { return has(rule, Judgement::pass); }
+  bool failed(const std::string& rule) const { return has(rule, Judgement::fail); }
 
   /// Newest valid report since the session was cleared. Throws if the device has stopped sending.
   const PoseReport& latest() const {
@@ -720,7 +721,10 @@ class Conformance {
     }
     user_.instruct(fmt::format("Pulses of at most {:.2f} N and {:.3f} N.m follow.", pulse_N(), pulse_Nm()));
     judge_direction("force_direction", true, 2.0 * profile_.pose_report.position.step);
-    judge_direction("torque_direction", false, 4.0 * profile_.pose_report.orientation.step);
+    if (failed("quaternion_order"))
+      skip("torque_direction", "the order of the quaternion is wrong", kUnitsSection);
+    else
+      judge_direction("torque_direction", false, 4.0 * profile_.pose_report.orientation.step);
   }
 
   double pulse_N() const { return std::min(kMaxPulse_N, kPulseShare * profile_.max_force_N); }

@@ -222,7 +222,7 @@ TEST_CASE("conform names a quaternion that is not of unit length", "[conform]") 
 }
 
 TEST_CASE("conform names a device that does not acknowledge", "[conform]") {
-  for (const std::uint8_t constant : {0, 155})
+  for (const std::uint8_t constant : {std::uint8_t{0}, std::uint8_t{155}})
     CHECK(failed_with(in_reports([constant](ReportBytes& r) { r[kAcknowledged] = constant; })) ==
           Rules{"acknowledged"});
 }
