@@ -61,7 +61,7 @@ struct Run {
   void check(const ConformanceOptions& options = {}) {
     const ConformanceUser user = {[this](const std::string& text) { instructions.push_back(text); },
                                   [this] { return cancelled && cancelled(); }};
-    results = check_conformance(profile, link, nullptr, clock, user, options);
+    results = check_conformance(profile, link, usb, clock, user, options);
   }
   Rules with(Judgement judgement) const {
     Rules rules;
@@ -79,6 +79,7 @@ struct Run {
   void settle() { link.advance_to(clock.now() + 5ms); }
 
   DeviceProfile profile = reference_profile();
+  const UsbDevice* usb = nullptr;
   VirtualClock clock;
   FirmwareInHand device;
   LoopbackLink link;
@@ -349,6 +350,36 @@ TEST_CASE("conform names a report rate that differs from the profile", "[conform
   CHECK(run.with(Judgement::fail) == Rules{"report_rate"});
 }
 
+TEST_CASE("conform judges report descriptor, id and serial number of a USB device", "[conform]") {
+  UsbDevice good;
+  good.report_descriptor.assign(std::begin(wf_report_descriptor), std::end(wf_report_descriptor));
+  good.vendor = 0x1d50, good.product = 0x1234;
+  good.serial = "A1";
+  good.usage_page = 0xff00, good.usage = 0x01;
+  UsbDevice shorter = good, broken = good, mouse = good, shared = good, nameless = good;
+  shorter.report_descriptor[20] = 0x3E;  // report count 62
+  broken.report_descriptor.pop_back();
+  mouse.usage_page = 0x01, mouse.usage = 0x02;
+  shared.vendor = 0x16c0, shared.product = 0x0486;  // every Teensy
+  nameless.serial.clear();
+  const std::vector<std::pair<UsbDevice, Rules>> cases = {
+      {good, {}},
+      {shorter, {"report_descriptor"}},
+      {broken, {"report_descriptor"}},
+      {mouse, {"report_descriptor"}},
+      {shared, {"usb_id"}},
+      {nameless, {"serial_number"}},
+  };
+  for (const auto& [usb, expected] : cases) {
+    Run run;
+    run.usb = &usb;
+    run.check({0s, false});
+    INFO(conformance_text(run.results));
+    CHECK(run.with(Judgement::fail) == expected);
+    CHECK(run.of("serial_number").judgement != Judgement::not_judged);
+  }
+}
+
 TEST_CASE("conform does not judge what it did not see", "[conform]") {
   SimulationSettings still;
   still.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0, 0, 0}}};
@@ -441,6 +472,8 @@ class FirmwareProcess final : private ReportSink {
   FirmwareProcess(const FirmwareProcess&) = delete;
   FirmwareProcess& operator=(const FirmwareProcess&) = delete;
   std::string socket() const { return std::to_string(near_); }
+  bool motors_on() const { return motors_on_; }
+  bool tripped() const { return tripped_; }
 
  private:
   /// The device is switched on when the program has opened the socket and discarded what waited in it.
@@ -456,6 +489,8 @@ class FirmwareProcess final : private ReportSink {
       std::array<std::uint8_t, 64> bytes{};
       for (ssize_t n; (n = recv(far_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0;)
         device_.take_command(device_.now(), std::span(bytes).first(static_cast<std::size_t>(n)));
+      motors_on_ = device_.firmware().motors_on;
+      tripped_ = device_.firmware().watchdog_tripped;
       std::this_thread::sleep_for(200us);
     }
   }
@@ -465,7 +500,7 @@ class FirmwareProcess final : private ReportSink {
 
   FirmwareInHand device_;
   int far_ = -1, near_ = -1;
-  std::atomic<bool> stop_{false};
+  std::atomic<bool> stop_{false}, motors_on_{false}, tripped_{false};
   std::thread thread_;
 };
 
@@ -490,6 +525,23 @@ TEST_CASE("wrenchctl conform judges a device at the other end of a socket, and i
       CHECK_THAT(result.out, Contains("(breaks devices/README.md, Frames, units and signs)"));
     }
   }
+}
+
+TEST_CASE("a signal ends wrenchctl conform, which releases the device", "[conform][wall_time]") {
+  const MachineLoad load;
+  const FirmwareProcess device;
+  RunningProgram program(
+      "wrenchctl", {"conform", WRENCHD_SOURCE_DIR "/config/profiles/reference_full_speed.toml", "--link-fd",
+                    device.socket(), "--motion", "3"});
+  REQUIRE_RATE(load, program.wait_for_output("Pulses of at most"));
+  REQUIRE_RATE(load, device.motors_on());
+  program.signal(SIGTERM);
+  const ProgramResult result = program.wait();
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.err, Contains("cancelled; the device was released"));
+  for (int i = 0; i < 100 && device.motors_on(); ++i) std::this_thread::sleep_for(10ms);
+  CHECK_FALSE(device.motors_on());
+  REQUIRE_RATE(load, !device.tripped());  // released by the commands, not by the watchdog
 }
 
 TEST_CASE("wrenchctl conform rejects what it cannot check, with the remedy", "[conform]") {

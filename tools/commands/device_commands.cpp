@@ -108,13 +108,16 @@ class DeviceCommands final : public Subcommand {
                      "longest time to move the handle, in seconds; 0: no motion")
         ->check(CLI::Range(0.0, 600.0))
         ->capture_default_str();
-    conform->add_flag("!--no-pulses", conform_.pulses, "apply no force; the direction is then not judged");
+    conform->add_flag("--no-pulses", no_pulses_, "apply no force; the direction is then not judged");
     conform->footer(
         "The device gets zero wrenches and, at the end, pulses of at most 0.5 N and 0.02 N.m and a "
         "twentieth\n"
         "of the limits of the profile. Nothing is sent before its reports are valid. Ctrl-C releases it.\n"
         "Exit code 0: no rule failed. 5: a rule failed.");
-    conform->callback([this] { exit_code_ = run_conform(conform_) ? kExitDone : kExitUnfit; });
+    conform->callback([this] {
+      conform_.pulses = !no_pulses_;
+      exit_code_ = run_conform(conform_) ? kExitDone : kExitUnfit;
+    });
   }
 
   void add_profile(CLI::App& app) {
@@ -153,6 +156,7 @@ class DeviceCommands final : public Subcommand {
   std::string output_ = "-";
   CalibrateOptions calibration_;
   ConformOptions conform_;
+  bool no_pulses_ = false;
 };
 
 }  // namespace
