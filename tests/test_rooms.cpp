@@ -68,6 +68,21 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
   }
 }
 
+TEST_CASE("the firmware reference includes only the integer headers of C99", "[rooms]") {
+  for (const char* file : {"wrench_firmware.h", "wrench_firmware.c"}) {
+    std::ifstream in(fs::path(WRENCHD_SOURCE_DIR) / "devices/firmware" / file);
+    REQUIRE(in);
+    const std::regex line(R"re(^\s*#include\s+["<]([^">]+)[">])re");
+    std::smatch match;
+    for (std::string text; std::getline(in, text);) {
+      if (!std::regex_search(text, match, line)) continue;
+      INFO(file << " includes " << match[1]);
+      const std::set<std::string> allowed = {"stdbool.h", "stddef.h", "stdint.h", "wrench_firmware.h"};
+      CHECK(allowed.count(match[1]) == 1);
+    }
+  }
+}
+
 TEST_CASE("headers do not include CGAL, hidapi, toml++ or HDF5", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude)
     for (const Include& include : includes_of(room)) {

@@ -10,12 +10,10 @@
 #include <unistd.h>
 
 #include "config/calibration_store.hpp"
-#include "config/known_profiles.hpp"
-#include "config/load_profile.hpp"
-#include "config/settings.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/device_homing.hpp"
 #include "devices/links/reconnecting_link.hpp"
+#include "tools/connected_device.hpp"
 
 namespace wrenchd {
 namespace {
@@ -23,42 +21,6 @@ namespace {
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
 std::atomic<bool> interrupted{false};
-
-std::vector<DeviceProfile> profiles_named(const std::string& name) {
-  if (name == kAnyProfile) return known_profiles(SearchPath()).profiles;
-  const DeviceProfile profile = load_profile_named(name);
-  if (profile.transport == Transport::loopback)
-    throw std::runtime_error("profile " + profile.name +
-                             ": it is for the simulated device, which needs no calibration");
-  return {profile};
-}
-
-/// Profile and serial number of the connected device to calibrate.
-struct Target {
-  DeviceProfile profile;
-  std::string serial;
-};
-
-Target find_target(const CalibrateOptions& options) {
-  const std::vector<DeviceProfile> profiles = profiles_named(options.profile);
-  const std::vector<UsbDevice> connected = list_usb_devices();
-  DeviceCriteria criteria;
-  criteria.serial = options.serial;
-  if (options.profile != kAnyProfile) criteria.profile = profiles.front().name;
-  const DeviceChoice choice = choose_device(connected, profiles, criteria);
-  if (!choice.selection) {
-    std::string text = "no such device is connected; wrenchctl devices lists the connected devices";
-    for (const std::string& rejected : describe_rejected(connected, choice)) text += "\n  " + rejected;
-    throw std::runtime_error(text);
-  }
-  const UsbDevice& device = connected[choice.selection->device];
-  if (device.serial.empty())
-    throw std::runtime_error(
-        describe(device) +
-        ": the device has no serial number, so its calibration cannot be stored; change its "
-        "firmware to send a serial number");
-  return {profiles[choice.selection->profile], device.serial};
-}
 
 /// Returns true if the operator has typed a line since the last call.
 bool line_typed() {
@@ -92,15 +54,21 @@ Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const
 }
 
 int run_calibrate(const CalibrateOptions& options) {
-  const Target target = find_target(options);
+  const ConnectedDevice target = find_connected_device(options.profile, options.serial);
+  if (target.device.serial.empty())
+    throw std::runtime_error(
+        describe(target.device) +
+        ": the device has no serial number, so its calibration cannot be stored; change its "
+        "firmware to send a serial number");
+  const std::string& serial = target.device.serial;
   const CalibrationStore store;
-  ReconnectingLink link(target.profile, target.serial, link_settings(target.profile));
+  ReconnectingLink link(target.profile, serial, link_settings(target.profile));
   ProfileDevice device(target.profile, link);
   WallClock clock;
   device.open();
   std::signal(SIGINT, [](int) { interrupted.store(true); });
   std::printf("%s, serial number %s. The motors stay off. Ctrl-C cancels.\n", target.profile.name.c_str(),
-              target.serial.c_str());
+              serial.c_str());
   const OperatorInterface operator_interface = {[](const std::string& instruction) {
                                                   std::printf("%s\n", instruction.c_str());
                                                   std::fflush(stdout);
@@ -112,7 +80,7 @@ int run_calibrate(const CalibrateOptions& options) {
   };
   Calibration calibration;
   try {
-    calibration = calibrate(device, target.profile, target.serial, clock, operator_interface);
+    calibration = calibrate(device, target.profile, serial, clock, operator_interface);
   } catch (...) {
     release_device();
     throw;

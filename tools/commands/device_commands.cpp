@@ -10,6 +10,7 @@
 #include "daemon/option_checks.hpp"
 #include "tools/calibrate.hpp"
 #include "tools/commands/subcommand.hpp"
+#include "tools/conform.hpp"
 #include "tools/descriptor_source.hpp"
 #include "tools/list_devices.hpp"
 #include "tools/output_file.hpp"
@@ -19,13 +20,14 @@
 namespace wrenchd {
 namespace {
 
-/// devices, udev-rules, calibrate and profile.
+/// devices, udev-rules, calibrate, conform and profile.
 class DeviceCommands final : public Subcommand {
  public:
   void add_to(CLI::App& app) override {
     add_devices(app);
     add_udev_rules(app);
     add_calibrate(app);
+    add_conform(app);
     add_profile(app);
   }
 
@@ -81,6 +83,43 @@ class DeviceCommands final : public Subcommand {
     calibrate->callback([this] { exit_code_ = run_calibrate(calibration_); });
   }
 
+  void add_conform(CLI::App& app) {
+    CLI::App* conform =
+        app.add_subcommand("conform",
+                           "For makers: check the rules of the open report layout with a device, one line\n"
+                           "per rule, and name the section of devices/README.md that a failed rule breaks");
+    conform
+        ->add_option("profile", conform_.profile,
+                     "name or file of the profile; auto: the profile of the connected device")
+        ->check(not_empty("name a profile, or leave it out"))
+        ->capture_default_str();
+    conform->add_option("--serial", conform_.serial, "serial number, to select one of several devices")
+        ->check(not_empty("give the serial number; wrenchctl devices lists it"));
+    CLI::Option* node =
+        conform->add_option("--node", conform_.hidraw_node, "/dev/hidrawN, to select one of several devices")
+            ->check(not_empty("give the node; wrenchctl devices lists it"));
+    conform
+        ->add_option("--link-fd", conform_.link_fd,
+                     "inherited socket of a device in another process, instead of a connected device")
+        ->check(CLI::NonNegativeNumber)
+        ->excludes(node);
+    conform
+        ->add_option("--motion", conform_.motion_s,
+                     "longest time to move the handle, in seconds; 0: no motion")
+        ->check(CLI::Range(0.0, 600.0))
+        ->capture_default_str();
+    conform->add_flag("--no-pulses", no_pulses_, "apply no force; the direction is then not judged");
+    conform->footer(
+        "The device gets zero wrenches and, at the end, pulses of at most 0.5 N and 0.02 N.m and a "
+        "twentieth\n"
+        "of the limits of the profile. Nothing is sent before its reports are valid. Ctrl-C releases it.\n"
+        "Exit code 0: no rule failed. 5: a rule failed.");
+    conform->callback([this] {
+      conform_.pulses = !no_pulses_;
+      exit_code_ = run_conform(conform_) ? kExitDone : kExitUnfit;
+    });
+  }
+
   void add_profile(CLI::App& app) {
     CLI::App* profile =
         app.add_subcommand("profile",
@@ -116,6 +155,8 @@ class DeviceCommands final : public Subcommand {
   std::filesystem::path profile_directory_, descriptor_;
   std::string output_ = "-";
   CalibrateOptions calibration_;
+  ConformOptions conform_;
+  bool no_pulses_ = false;
 };
 
 }  // namespace

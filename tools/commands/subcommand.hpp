@@ -20,7 +20,7 @@ enum ExitCode : int {
   kExitDefects = 2,     ///< mesh: the mesh is not a solid
   kExitInfeasible = 3,  ///< solve: no admissible pose was found near a pose
   kExitDiffers = 4,     ///< replay: a tick differs
-  kExitUnfit = 5,       ///< doctor: a check failed
+  kExitUnfit = 5,       ///< doctor, conform: a check failed
 };
 
 /// One or several related subcommands of wrenchctl with their options. Not RT-safe: commands read and write
@@ -49,7 +49,7 @@ inline constexpr const char* kDaemonGroup = "A running daemon";
 std::unique_ptr<Subcommand> make_solve_command();
 std::unique_ptr<Subcommand> make_check_command();
 std::unique_ptr<Subcommand> make_report_commands();  ///< decode, encode
-std::unique_ptr<Subcommand> make_device_commands();  ///< devices, udev-rules, calibrate, profile
+std::unique_ptr<Subcommand> make_device_commands();  ///< devices, udev-rules, calibrate, conform, profile
 std::unique_ptr<Subcommand> make_doctor_command();
 std::unique_ptr<Subcommand> make_daemon_commands();  ///< status, watch, arm, record and others
 std::unique_ptr<Subcommand> make_view_command();
