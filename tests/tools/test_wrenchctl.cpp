@@ -562,8 +562,10 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
     std::string expected;
   } const table[] = {
       {{},
-       "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, conform, profile, doctor, "
-       "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, gallery, "
+       "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, conform, profile, "
+       "doctor, "
+       "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, "
+       "gallery, "
        "paper, replay, export, plot) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
