@@ -379,7 +379,9 @@ void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const 
     file_->rows[i].contact_count = ranges[i].count;
   }
   file_->append(file_->contacts, file_->contact_row, file_->contact_rows, contacts.data(), contacts.size());
-  if (!contacts.empty() && H5Dflush(file_->contacts) < 0) file_->fail();
+  // The whole file is flushed, because its recorded end must include the new rows: H5Dflush() would leave
+  // them beyond the end until the next flush() of the file.
+  if (!contacts.empty()) flush();
   file_->append(file_->ticks, file_->tick_row, file_->tick_rows, file_->rows.data(), ticks.size());
 }
 
