@@ -64,18 +64,23 @@ class DeviceCommands final : public Subcommand {
     rules->callback([this] { run_udev_rules(); });
   }
 
+  /// Adds the options that select a connected device.
+  static void add_device_options(CLI::App& command, std::string& profile, std::string& serial) {
+    command
+        .add_option("profile", profile,
+                    "name or file of the profile; auto: the profile of the connected device")
+        ->check(not_empty("name a profile, or leave it out"))
+        ->capture_default_str();
+    command.add_option("--serial", serial, "serial number, to select one of several devices")
+        ->check(not_empty("give the serial number; wrenchctl devices lists it"));
+  }
+
   void add_calibrate(CLI::App& app) {
     CLI::App* calibrate =
         app.add_subcommand("calibrate",
                            "Calibrate a connected device with the motors off: a person moves it to its\n"
                            "reference pose and along its axes. Stores the result by serial number");
-    calibrate
-        ->add_option("profile", calibration_.profile,
-                     "name or file of the profile; auto: the profile of the connected device")
-        ->check(not_empty("name a profile, or leave it out"))
-        ->capture_default_str();
-    calibrate->add_option("--serial", calibration_.serial, "serial number, to select one of several devices")
-        ->check(not_empty("give the serial number; wrenchctl devices lists it"));
+    add_device_options(*calibrate, calibration_.profile, calibration_.serial);
     calibrate->footer(
         "Shows the instructions step by step. Enter, or the button in the profile, confirms that the handle\n"
         "is at its reference pose. Calibrations are stored in calibration/ of $STATE_DIRECTORY, or of\n"
@@ -88,13 +93,7 @@ class DeviceCommands final : public Subcommand {
         app.add_subcommand("conform",
                            "For makers: check the rules of the open report layout with a device, one line\n"
                            "per rule, and name the section of devices/README.md that a failed rule breaks");
-    conform
-        ->add_option("profile", conform_.profile,
-                     "name or file of the profile; auto: the profile of the connected device")
-        ->check(not_empty("name a profile, or leave it out"))
-        ->capture_default_str();
-    conform->add_option("--serial", conform_.serial, "serial number, to select one of several devices")
-        ->check(not_empty("give the serial number; wrenchctl devices lists it"));
+    add_device_options(*conform, conform_.profile, conform_.serial);
     CLI::Option* node =
         conform->add_option("--node", conform_.hidraw_node, "/dev/hidrawN, to select one of several devices")
             ->check(not_empty("give the node; wrenchctl devices lists it"));

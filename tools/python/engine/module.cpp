@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The extension module wrenchd._engine: NumPy arrays in, arrays out. The classes that users see are in
 // ../wrenchd/engine.py; they check shapes and own the docstrings.
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -109,10 +110,10 @@ py::tuple read_mesh(const std::string& file) {
   return arrays_of(soup);
 }
 
-Pose pose_from(const Array& numbers) {
+/// Returns the pose of seven numbers, with the quaternion normalized as wrenchctl does.
+Pose pose_from(const double* numbers) {
   PoseNumbers x{};
-  const auto from = numbers.unchecked<1>();
-  for (py::ssize_t i = 0; i < 7; ++i) x[static_cast<std::size_t>(i)] = from(i);
+  std::copy(numbers, numbers + x.size(), x.begin());
   Pose pose = pose_from_numbers(x);
   pose.rotation.normalize();
   return pose;
@@ -264,21 +265,15 @@ class Engine {
     if (parts.size() > 1) obstacle.parts = std::move(parts);
     obstacle.scale = body["scale"].cast<double>();
     obstacle.kind = kind_from(body["kind"].cast<std::string>());
-    obstacle.X_WM = pose_from(body["pose"].cast<Array>());
+    obstacle.X_WM = pose_from(body["pose"].cast<Array>().data());
     obstacle.motion.linear_m_per_s = vector_from(body["linear_velocity"]);
     obstacle.motion.angular_rad_per_s = vector_from(body["angular_velocity"]);
     return obstacle;
   }
 
   static std::vector<Pose> poses_from(const Array& poses) {
-    const auto from = poses.unchecked<2>();
     std::vector<Pose> out;
-    for (py::ssize_t i = 0; i < from.shape(0); ++i) {
-      PoseNumbers x{};
-      for (py::ssize_t k = 0; k < 7; ++k) x[static_cast<std::size_t>(k)] = from(i, k);
-      out.push_back(pose_from_numbers(x));
-      out.back().rotation.normalize();
-    }
+    for (py::ssize_t i = 0; i < poses.shape(0); ++i) out.push_back(pose_from(poses.data(i, 0)));
     return out;
   }
   template <class Value, class Function>
