@@ -15,9 +15,14 @@ namespace {
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
 /// Boxes grow by this fraction of the mesh's extent, to contain the rounding to single precision.
 constexpr double kRounding = 4e-7;
-/// Other axes than those of the mesh's frame are taken if they reduce the bounds of triangles to this
-/// fraction.
+/// Another choice (axes other than those of the mesh's frame, a split not across the longest axis) is taken
+/// if it reduces the cost to this fraction.
 constexpr double kWorthwhile = 0.9;
+/// Other splits than across the longest axis are tried for at most this number of triangles. More triangles
+/// rarely lie in one sheet.
+constexpr std::uint32_t kMaxCompared = 4096;
+/// Traversals enlarge boxes by about this fraction of the mesh's extent.
+constexpr double kEnlargement = 1e-4;
 
 /// A box in double precision, and the centroid of the surface in it.
 struct Fitted {
@@ -29,6 +34,17 @@ struct Fitted {
   double half_area() const noexcept {
     return half_m[0] * half_m[1] + half_m[1] * half_m[2] + half_m[2] * half_m[0];
   }
+};
+
+struct Range {
+  std::uint32_t begin, end;  ///< in the order of the triangles
+};
+
+/// A range divided into two, with the boxes of both parts.
+struct Halves {
+  Range range;
+  std::uint32_t middle;
+  Fitted below, above;
 };
 
 /// A node of the binary tree from which the nodes with eight boxes are formed.
@@ -134,7 +150,9 @@ class Builder {
   const Vector3d& corner(std::uint32_t triangle, std::size_t i) const {
     return vertices_S_m_[mesh_.triangles[triangle][i]];
   }
-  Fitted fit(std::uint32_t begin, std::uint32_t end) const;
+  Fitted fit(Range range) const;
+  Halves halve(Range range, const Fitted& box, int axis);
+  double overlap_cost(const Halves& halves) const;
   void split();
 
   const MeshSurface& surface_;
@@ -148,7 +166,8 @@ class Builder {
 
 /// The axes are those of the covariance of the surface. A triangle with corners p, centroid g and area A
 /// contributes  A/12 (9 g g' + sum p p').
-Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
+Fitted Builder::fit(Range range) const {
+  const auto [begin, end] = range;
   constexpr double kLeastArea = 1e-30;  // prevents a division by zero
   const Vector3d origin = middle_[order_[begin]];
   double area = 0.0;
@@ -188,32 +207,64 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
   return box;
 }
 
-/// Splits near the mean across the longest axis until each leaf has at most eight triangles.
+/// Splits until each leaf has at most eight triangles: across the longest axis, or across the second one if
+/// that gives thinner boxes.
 void Builder::split() {
-  const auto add = [&](std::uint32_t begin, std::uint32_t end) {
-    branches_.push_back({fit(begin, end), begin, end, 0, 0});
+  const auto add = [&](const Fitted& box, Range range) {
+    branches_.push_back({box, range.begin, range.end, 0, 0});
     return static_cast<std::uint32_t>(branches_.size() - 1);
   };
-  add(0, static_cast<std::uint32_t>(order_.size()));
+  const Range all = {0, static_cast<std::uint32_t>(order_.size())};
+  add(fit(all), all);
+  std::vector<std::uint32_t> order_across_longest;
   for (std::uint32_t at = 0; at < branches_.size(); ++at) {
     const auto [box, begin, end, left, right] = branches_[at];
     if (end - begin <= kWidth) continue;
-    const Vector3d along = box.axes.row(0);
-    const double cut = along.dot(box.mean_m);
-    const auto first = order_.begin() + begin, last = order_.begin() + end;
-    const auto below = [&](std::uint32_t t) { return along.dot(middle_[t]); };
-    const auto at_mean = std::count_if(first, last, [&](std::uint32_t t) { return below(t) < cut; });
-    // The lower part takes a multiple of eight triangles, so that leaves are full.
-    const std::ptrdiff_t eights = std::clamp<std::ptrdiff_t>((at_mean + 4) / 8, 1, (last - first - 1) / 8);
-    const auto middle = first + 8 * eights;
-    std::nth_element(first, middle, last, [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(below(a), a) < std::pair(below(b), b);
-    });
-    const auto half = static_cast<std::uint32_t>(middle - order_.begin());
-    const std::uint32_t a = add(begin, half), b = add(half, end);
+    Halves halves = halve({begin, end}, box, 0);
+    if (end - begin <= kMaxCompared) {
+      order_across_longest.assign(order_.begin() + begin, order_.begin() + end);
+      const Halves across_second = halve({begin, end}, box, 1);
+      if (overlap_cost(across_second) < kWorthwhile * overlap_cost(halves))
+        halves = across_second;
+      else
+        std::copy(order_across_longest.begin(), order_across_longest.end(), order_.begin() + begin);
+    }
+    const std::uint32_t a = add(halves.below, {begin, halves.middle}),
+                        b = add(halves.above, {halves.middle, end});
     branches_[at].left = a;
     branches_[at].right = b;
   }
+}
+
+/// Divides the triangles of a range near their mean along an axis of their box, and reorders them.
+Halves Builder::halve(Range range, const Fitted& box, int axis) {
+  const Vector3d along = box.axes.row(axis);
+  const double cut = along.dot(box.mean_m);
+  const auto first = order_.begin() + range.begin, last = order_.begin() + range.end;
+  const auto position_m = [&](std::uint32_t t) { return along.dot(middle_[t]); };
+  const auto below_mean = std::count_if(first, last, [&](std::uint32_t t) { return position_m(t) < cut; });
+  // The lower part takes a multiple of eight triangles, so that leaves are full.
+  const std::ptrdiff_t eights = std::clamp<std::ptrdiff_t>((below_mean + 4) / 8, 1, (last - first - 1) / 8);
+  const auto middle = first + 8 * eights;
+  std::nth_element(first, middle, last, [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(position_m(a), a) < std::pair(position_m(b), b);
+  });
+  const auto at = static_cast<std::uint32_t>(middle - order_.begin());
+  return {range, at, fit({range.begin, at}), fit({at, range.end})};
+}
+
+/// Returns a measure of how many boxes of another mesh overlap the two boxes, weighted by their triangles.
+/// Boxes of half the size (x, y, z) overlap a box of half the size (a, b, c) if they are not farther apart
+/// than a + x and b + y along the surface and c + z across it. Here the other boxes are square, x = y =
+/// sqrt(a b), so that no box becomes a needle, and as thin as this one; a little more, because rounding and
+/// reach enlarge boxes.
+double Builder::overlap_cost(const Halves& halves) const {
+  const auto cost = [&](const Fitted& box) {
+    const double a = box.half_m[0], b = box.half_m[1], side = std::sqrt(a * b);
+    return (a + side) * (b + side) * (box.half_m[2] + kEnlargement * extent_m_);
+  };
+  return (halves.middle - halves.range.begin) * cost(halves.below) +
+         (halves.range.end - halves.middle) * cost(halves.above);
 }
 
 TriangleBvh::Leaf Builder::leaf(const Branch& branch) const {

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <numbers>
+
 #include <catch2/catch.hpp>
 
 #include "collision/meshes/make_mesh.hpp"
@@ -62,6 +65,36 @@ TEST_CASE("a BVH contains every triangle once, inside all boxes above it", "[tri
       CHECK(static_cast<double>(bvh.leaves().size()) <=
             1.05 * static_cast<double>(surface.triangles().size()) / 8.0 + 1.0);
     }
+}
+
+// Around a cylinder a square leaf of four cells is as thick as the arc of two cells is high. A strip of cells
+// along the axis is flat. Thin boxes keep two conforming surfaces apart.
+TEST_CASE("leaves on a cylinder are strips along its axis", "[triangle_bvh]") {
+  constexpr std::uint32_t kAround = 128, kAlong = 32;
+  constexpr double kRadius_m = 0.01, kFullTurn_rad = 2.0 * std::numbers::pi;
+  TriangleMesh tube;
+  for (std::uint32_t i = 0; i <= kAlong; ++i)
+    for (std::uint32_t k = 0; k < kAround; ++k) {
+      const double angle = kFullTurn_rad * k / kAround;
+      tube.vertices_m.push_back({kRadius_m * std::cos(angle), kRadius_m * std::sin(angle), 0.0005 * i});
+    }
+  for (std::uint32_t i = 0; i < kAlong; ++i)
+    for (std::uint32_t k = 0; k < kAround; ++k) {
+      const std::uint32_t a = kAround * i + k, b = kAround * i + (k + 1) % kAround;
+      tube.triangles.push_back({a, b, b + kAround});
+      tube.triangles.push_back({a, b + kAround, a + kAround});
+    }
+  const TriangleBvh bvh(MeshSurface(tube, Kind::surface));
+  double sum_m = 0.0;
+  int leaves = 0;
+  for (const TriangleBvh::Box& box : bvh.boxes()) {
+    if (box.count <= 0) continue;
+    sum_m += box.half[2];
+    ++leaves;
+  }
+  const double square_m = 0.5 * kRadius_m * (1.0 - std::cos(kFullTurn_rad / kAround));
+  CHECK(leaves == 1024);
+  CHECK(sum_m / leaves < 0.25 * square_m);
 }
 
 TEST_CASE("the data are oriented as most triangles are", "[triangle_bvh]") {
