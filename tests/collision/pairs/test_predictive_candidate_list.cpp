@@ -261,6 +261,24 @@ TEST_CASE("a deferrable list is built over several ticks and then used", "[predi
   CHECK(pairs.covered_fraction(pose_on_path(59), aside) == 1.0);
 }
 
+// A tick that may not defer work gets a list that is too expensive for it. If every tick began the list anew,
+// the proxy would stand still for ever.
+TEST_CASE("a list that exceeds the budget of one tick continues in the next ones",
+          "[predictive_candidate_list]") {
+  PredictiveCandidateList pairs(bumpy_bodies());
+  constexpr std::uint32_t kSmall = 40;
+  int ticks = 0;
+  for (bool listed = false; !listed; ++ticks) {
+    REQUIRE(ticks < 100);
+    VisitBudget budget = {kSmall};
+    listed = pairs.ensure_covers(pose_on_path(0), pose_on_path(1), budget);
+    CHECK_FALSE(pairs.list_pending());  // the caller may try a shorter path
+  }
+  CHECK(ticks > 1);
+  CHECK(pairs.current().node_visits() > kSmall);
+  CHECK(pairs.current().covers(pose_on_path(1)));
+}
+
 TEST_CASE("a pending list is discarded if the path leads elsewhere", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
