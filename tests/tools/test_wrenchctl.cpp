@@ -480,6 +480,22 @@ TEST_CASE("wrenchctl mesh and check report repairs and an implausible size") {
         std::string::npos);
 }
 
+TEST_CASE("wrenchctl mesh shows several files as one body") {
+  const TemporaryDirectory dir;
+  const std::string a = dir.write("a.off", as_off(box({0, 0, 0}, {0.08, 0.08, 0.08})));
+  const std::string b = dir.write("b.off", as_off(box({0.04, 0, 0}, {0.12, 0.08, 0.08})));
+  const ProgramResult both = run_program("wrenchctl", {"mesh", a, b});
+  CHECK(both.exit_code == 0);
+  CHECK(both.out.find("repaired           2 parts are one body: their union\n") != std::string::npos);
+  CHECK(both.out.find("volume             0.000768 m^3\n") != std::string::npos);
+  PolygonSoup tray = box({0, 0, 0}, {0.08, 0.08, 0.08});
+  tray.faces.pop_back();
+  const std::string open = dir.write("open.off", as_off(tray));
+  const ProgramResult refused = run_program("wrenchctl", {"mesh", a, open});
+  CHECK(refused.exit_code == 2);
+  CHECK(refused.err.find(open + ": is not a closed, consistently oriented solid") != std::string::npos);
+}
+
 TEST_CASE("wrenchctl reports the progress of a large mesh and caches the result") {
   const TemporaryDirectory dir;
   const std::string file = (dir.path() / "large.off").string();

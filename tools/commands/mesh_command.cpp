@@ -106,7 +106,9 @@ class MeshCommand final : public Subcommand {
     CLI::App* mesh = app.add_subcommand("mesh",
                                         "Show volume, inertia, repairs and defects of a mesh, or generate a\n"
                                         "mesh for experiments");
-    auto* file = mesh->add_option("file", file_, "OFF, OBJ, STL or PLY file")->check(not_empty());
+    auto* files = mesh->add_option("files", files_,
+                                   "OFF, OBJ, STL or PLY file; several files are the parts of one body")
+                      ->check(not_empty());
     mesh->add_option("--scale", scale_, "metres per mesh unit")
         ->check(number_in_range(1e-9, 1e6))
         ->capture_default_str();
@@ -118,7 +120,7 @@ class MeshCommand final : public Subcommand {
     }
     auto* make = mesh->add_option("--make", generated_.kind, "generate a solid of this kind, in metres")
                      ->check(CLI::IsMember(kinds))
-                     ->excludes(file);
+                     ->excludes(files);
     mesh->add_option("--triangles", generated_.triangles, "approximate number of triangles")
         ->check(CLI::Range(GeneratedMesh::kMinTriangles, GeneratedMesh::kMaxTriangles))
         ->needs(make)
@@ -144,8 +146,12 @@ class MeshCommand final : public Subcommand {
   }
 
   int describe() {
-    if (file_.empty()) throw CLI::RequiredError("mesh: a file, or --make KIND,");
-    PolygonSoup soup = read_soup(file_);
+    if (files_.empty()) throw CLI::RequiredError("mesh: a file, or --make KIND,");
+    return files_.size() == 1 ? describe_file(files_.front()) : describe_parts();
+  }
+
+  int describe_file(const std::filesystem::path& file) {
+    PolygonSoup soup = read_soup(file);
     std::printf("%-18s %zu\n%-18s %zu\n", "vertices", soup.vertices.size(), "faces", soup.faces.size());
     TriangleMesh mesh;
     const MeshReport report = repair_and_check_solid(soup, &mesh);
@@ -154,15 +160,30 @@ class MeshCommand final : public Subcommand {
     std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
                 report.consistent ? "yes" : "no");
     if (!report.solid()) {
-      print_note(rejection_text(file_, soup, BodyKind::solid, report));
-      print_surface(std::move(soup), file_, scale_);
+      print_note(rejection_text(file, soup, BodyKind::solid, report));
+      print_surface(std::move(soup), file, scale_);
       return kExitDefects;
     }
-    print_solid(std::move(mesh), file_, scale_);
+    print_solid(std::move(mesh), file, scale_);
     return kExitDone;
   }
 
-  std::filesystem::path file_;
+  /// Several files are one body, as in a scene's `meshes`.
+  int describe_parts() {
+    MeshLoader loader = make_mesh_loader();
+    std::shared_ptr<const LoadedMesh> body;
+    try {
+      body = loader.load_parts(files_, BodyKind::solid);
+    } catch (const MeshError& error) {
+      print_note(error.what());
+      return kExitDefects;
+    }
+    for (const std::string& repair : body->repairs) std::printf("%-18s %s\n", "repaired", repair.c_str());
+    print_solid(body->mesh, body->file, scale_);
+    return kExitDone;
+  }
+
+  std::vector<std::filesystem::path> files_;
   double scale_ = 1.0;
   GeneratedMesh generated_;
   std::string output_ = "-";
