@@ -57,8 +57,10 @@ void read_script(TomlTable& table, HandScript& script) {
 
 void load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation) {
   HandScript script;
-  read_toml(file, read_script, script);
+  std::string text = read_config_text(file);
+  read_toml_text(text, file, read_script, script);
   simulation.hand_script = file;
+  simulation.hand_script_text = std::move(text);
   simulation.hand_repeats = script.repeats;
   simulation.hand_path = std::move(script.path);
 }

@@ -72,6 +72,7 @@ std::vector<std::filesystem::path> mesh_files(const Body& body) {
 
 struct SceneSettings {
   std::filesystem::path file;  ///< source file, for messages
+  std::string text = {};       ///< content of the source file as it was read; empty: not from a file
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
   std::vector<MeshObstacleSettings> meshes;

@@ -43,6 +43,15 @@ TickRecord random_record(RandomValues& random) {
   r.energy = -0.0;
   r.kkt_residual = std::numeric_limits<double>::denorm_min();
   r.authority = std::numeric_limits<double>::infinity();
+  // A value that stands for a name has one.
+  for (const RecordField& field : tick_fields()) {
+    const std::size_t names = value_names(field.values).size();
+    if (names == 0 || is_bits(field.values)) continue;
+    auto* const lowest = reinterpret_cast<unsigned char*>(&r) + field.offset;
+    const auto value = static_cast<unsigned char>(random.bits() % names);
+    std::memset(lowest, 0, field.bytes());
+    *lowest = value;
+  }
   return r;
 }
 
