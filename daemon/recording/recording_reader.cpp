@@ -42,6 +42,19 @@ constexpr std::uint64_t kAddressSpace = std::uint64_t{1} << 30;
 constexpr std::uint64_t kUnpackedBytes = std::uint64_t{1} << 30;
 constexpr std::uint64_t kUnpackedFactor = 256;
 
+/// A sanitizer needs terabytes of address space.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+#else
+constexpr bool kSanitized = false;
+#endif
+
 /// Returns true if another process has locked the file. HDF5 locks each file that it writes.
 bool is_locked(int fd) {
   // An own description of the file: the lock that this test takes ends with it.
@@ -118,9 +131,7 @@ double allowed_cpu_s(std::uint64_t file_bytes) {
   limit(RLIMIT_FSIZE, 0);
   limit(RLIMIT_CPU,
         static_cast<std::uint64_t>(allowed_cpu_s(file_bytes)) + 2);  // the parent counts more finely
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  limit(RLIMIT_AS, address_space() + kAddressSpace);
-#endif
+  if (!kSanitized) limit(RLIMIT_AS, address_space() + kAddressSpace);
   RecordingSender sender(kPipe);
   try {
     send_hdf5(

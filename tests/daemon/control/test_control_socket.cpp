@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <span>
 #include <sstream>
 
@@ -652,7 +653,8 @@ TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
   CHECK(byte == 'x');
 }
 
-TEST_CASE("replies with descriptors that nobody reads are bounded, and the excess is an error", "[control_socket]") {
+TEST_CASE("replies with descriptors that nobody reads are bounded, and the excess is an error",
+          "[control_socket]") {
   const MethodRow open{
       "test.open", Role::observer, {}, "Opens a file.", [&](const Json&, const Caller&) {
         return MethodResult(Json{{"open", true}}, OwnedFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)));
@@ -682,8 +684,10 @@ TEST_CASE("replies with descriptors that nobody reads are bounded, and the exces
 }
 
 TEST_CASE("a reply whose descriptor cannot be made is an error", "[control_socket]") {
-  const MethodRow open{"test.open", Role::observer, {}, "Has a descriptor that is closed.",
-                       [](const Json&, const Caller&) { return MethodResult(Json{{"open", true}}, 9999); }};
+  const MethodRow open{
+      "test.open", Role::observer, {}, "Has a descriptor that is closed.", [](const Json&, const Caller&) {
+        return MethodResult(Json{{"open", true}}, 9999);
+      }};
   MethodRow slow = open;
   slow.name = "test.slow";
   slow.slow = true;
