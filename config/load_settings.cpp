@@ -30,7 +30,7 @@ Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchP
   Settings settings;
   settings.file = file;
   read_toml_node(file, tree, read_settings, SettingContext{search, file}, settings);
-  load_hand_script(settings.simulation.hand_script, settings.simulation);
+  settings.hand_script_text = load_hand_script(settings.simulation.hand_script, settings.simulation);
   return settings;
 }
 

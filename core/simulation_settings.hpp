@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <string>
 #include <vector>
 
 #include "core/pose.hpp"
@@ -50,7 +49,6 @@ struct SimulationSettings {
   bool hand_repeats = true;  ///< true: the path restarts after its last waypoint
   /// file name, searched along the search path
   std::filesystem::path hand_script = "hands/press_and_rock.toml";
-  std::string hand_script_text = {};  ///< content of hand_script as it was read
   /// path from hand_script: at least one point, times strictly ascending from 0
   std::vector<Waypoint> hand_path;
   std::filesystem::path playback;  ///< recording or CSV file of poses; empty: the hand follows hand_script

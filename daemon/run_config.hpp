@@ -14,10 +14,10 @@ namespace wrenchd {
 struct RunConfig {
   Settings settings;
   DeviceProfile profile;  ///< the name is empty if the connected device decides
-  /// files of the profile as they were read, the nearest first; empty: not from files
-  std::vector<ConfigText> profile_texts = {};
   SceneSettings scene;
   bool simulated = true;  ///< true: wrenchd simulates a device with this profile; false: a real device
+  /// files of the profile as they were read, the nearest first; empty: not from files
+  std::vector<ConfigText> profile_texts = {};
 };
 
 }  // namespace wrenchd

@@ -164,8 +164,8 @@ RecordingHeader read_recorded_texts(const RunConfig& config) {
       header.files.push_back({"profile_" + std::to_string(number), one.file, {}, true, one.text});
     ++number;
   }
-  const SimulationSettings& simulation = config.settings.simulation;
-  header.files.push_back({"hand_script", simulation.hand_script, {}, true, simulation.hand_script_text});
+  header.files.push_back(
+      {"hand_script", config.settings.simulation.hand_script, {}, true, config.settings.hand_script_text});
   header.realtime = word(config.settings.servo.realtime);
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
