@@ -46,6 +46,16 @@ ConfigError::ConfigError(std::vector<Rejection> rejections)
 ConfigError::ConfigError(std::filesystem::path file, SourceLocation place, std::string message)
     : ConfigError(std::vector<Rejection>{{std::move(file), place, std::move(message)}}) {}
 
+std::string ConfigError::public_text(const std::filesystem::path& readable) const {
+  std::vector<Rejection> shown = rejections_;
+  for (Rejection& rejection : shown) {
+    // A message about the whole file, such as "no such file", quotes none of it.
+    if (rejection.file != readable && rejection.location.line > 0)
+      rejection.message = "is not valid; 'wrenchctl check' states the reason to a user who may read the file";
+  }
+  return to_lines(shown);
+}
+
 void RejectionList::add(SourceLocation place, std::string message) {
   const std::filesystem::path& file = place.file ? *place.file : file_;
   rejections_.push_back({file, std::move(place), std::move(message)});

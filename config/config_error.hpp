@@ -37,6 +37,9 @@ class ConfigError : public std::runtime_error {
   ConfigError(std::filesystem::path file, SourceLocation place, std::string message);
 
   const std::vector<Rejection>& rejections() const noexcept { return rejections_; }
+  /// Returns the message for someone who may read only the file `readable`: of the defects in all other files
+  /// the location, and nothing that the files contain. Not RT-safe: allocates.
+  std::string public_text(const std::filesystem::path& readable) const;
 
  private:
   std::vector<Rejection> rejections_;

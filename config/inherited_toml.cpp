@@ -87,9 +87,16 @@ fs::path parent_of(const std::string& name, const SourceLocation& place, const s
 
 }  // namespace
 
-TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vector<fs::path>* files) {
+TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vector<ConfigText>* texts) {
   std::vector<fs::path> chain = {file};
-  TomlNode merged = read_toml_file(file);
+  const auto read = [texts](const fs::path& one) {
+    std::string text = read_config_text(one);
+    TomlNode tree = read_toml_text(text, one);
+    if (texts != nullptr) texts->push_back({one, std::move(text)});
+    return tree;
+  };
+  if (texts != nullptr) texts->clear();
+  TomlNode merged = read(file);
   for (;;) {
     auto& table = std::get<TomlNode::Table>(merged.value);
     TomlEntry* entry = find(table, kKey);
@@ -105,11 +112,10 @@ TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vec
     const fs::path parent = parent_of(*name, place, chain, search);
     std::erase_if(table, [](const TomlEntry& e) { return e.key == kKey; });
     chain.push_back(parent);
-    TomlNode inherited = read_toml_file(parent);
+    TomlNode inherited = read(parent);
     set_file(inherited, std::make_shared<const fs::path>(parent));
     merge_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
   }
-  if (files != nullptr) *files = chain;
   return merged;
 }
 

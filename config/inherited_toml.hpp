@@ -14,10 +14,10 @@ namespace wrenchd {
 /// `inherits`. Inherited values keep their file in their location.
 ///
 /// NAME.toml is searched beside the file, then in profiles/ along the search path. Files already in the chain
-/// are skipped, so /etc/wrenchd/profiles/x.toml may inherit the package's x. chain: if given, receives the
-/// files read, the nearest first. Throws ConfigError if a parent is missing or the chain is cyclic, and what
-/// read_toml_file() throws. Not RT-safe: reads files.
+/// are skipped, so /etc/wrenchd/profiles/x.toml may inherit the package's x. texts: if given, receives the
+/// files as they were read, the nearest first. Throws ConfigError if a parent is missing or the chain is
+/// cyclic, and what read_toml_file() throws. Not RT-safe: reads files.
 TomlNode read_inherited(const std::filesystem::path& file, const SearchPath& search,
-                        std::vector<std::filesystem::path>* chain = nullptr);
+                        std::vector<ConfigText>* texts = nullptr);
 
 }  // namespace wrenchd

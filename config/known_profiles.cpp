@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/known_profiles.hpp"
 
+#include <utility>
+
 #include "config/load_profile.hpp"
 
 namespace wrenchd {
@@ -9,8 +11,10 @@ KnownProfiles known_profiles(const SearchPath& search) {
   KnownProfiles known;
   for (const std::filesystem::path& file : profile_files(search)) {
     try {
-      known.profiles.push_back(load_profile(file, search));
+      std::vector<ConfigText> texts;
+      known.profiles.push_back(load_profile(file, search, &texts));
       known.files.push_back(file);
+      known.texts.push_back(std::move(texts));
     } catch (const std::exception& rejected) {
       known.rejected.emplace_back(rejected.what());
     }

@@ -55,12 +55,14 @@ void read_script(TomlTable& table, HandScript& script) {
 
 }  // namespace
 
-void load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation) {
+std::string load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation) {
   HandScript script;
-  read_toml(file, read_script, script);
+  std::string text = read_config_text(file);
+  read_toml_text(text, file, read_script, script);
   simulation.hand_script = file;
   simulation.hand_repeats = script.repeats;
   simulation.hand_path = std::move(script.path);
+  return text;
 }
 
 }  // namespace wrenchd

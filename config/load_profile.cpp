@@ -14,6 +14,7 @@
 #include "config/report_bytes.hpp"
 #include "config/toml_reader.hpp"
 #include "core/limits.hpp"
+#include "core/profile_name.hpp"
 
 namespace wrenchd {
 namespace {
@@ -437,8 +438,11 @@ void read_more_reports(const TomlValue& list, DeviceProfile& p) {
 
 void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue name = table.mandatory("name");
-  if (name.text(p.name) && p.name.empty()) name.reject("must not be empty; status and records show it");
-  table.optional("description").text(p.description);
+  if (name.text(p.name) && !is_profile_name(p.name))
+    name.reject(
+        "must consist of 1 to 64 letters, digits, '_', '.' and '-', because udev rules, logs and records " +
+        std::string("contain it; found \"") + printable(p.name) + '"');
+  table.optional("description").paragraphs(p.description);
   table.mandatory("transport")
       .choice(
           p.transport,
@@ -502,9 +506,10 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
 
 }  // namespace
 
-DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search) {
+DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search,
+                           std::vector<ConfigText>* texts) {
   DeviceProfile profile;
-  read_toml_node(file, read_inherited(file, search), read_profile, profile);
+  read_toml_node(file, read_inherited(file, search, texts), read_profile, profile);
   return profile;
 }
 

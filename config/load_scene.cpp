@@ -60,8 +60,14 @@ void read_generated(TomlTable& table, GeneratedMesh& generated) {
     size.reject("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
+/// The scene that is read, and where its meshes may be.
+struct SceneReading {
+  SceneSettings& scene;
+  const FileScope& scope;
+};
+
 /// Reads a mesh file name, or a table that describes a generated mesh.
-void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
+void read_mesh(const TomlValue& value, const SceneReading& reading, fs::path& mesh,
                std::optional<GeneratedMesh>& generated) {
   if (value.is_table()) {
     value.table(read_generated, generated.emplace());
@@ -69,7 +75,12 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
     return;
   }
   if (!value.path(mesh)) return;
-  mesh = scene.file.parent_path() / mesh;
+  mesh = reading.scene.file.parent_path() / mesh;
+  // Outside of the scope the answer is the same whether the file exists or not.
+  if (!reading.scope.contains(mesh))
+    return value.reject("lies outside of the directories from which clients may load files (" +
+                        reading.scope.directories_text() +
+                        "); store it there, or let an administrator name it in the scene");
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
   value.reject(
@@ -79,7 +90,7 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
 }
 
 /// Reads a list of mesh file names: the parts of one body. mesh: receives the first one.
-void read_meshes(const TomlValue& list, const SceneSettings& scene, fs::path& mesh,
+void read_meshes(const TomlValue& list, const SceneReading& reading, fs::path& mesh,
                  std::vector<fs::path>& parts) {
   for (const TomlValue& value : list.elements("mesh file names, as in [\"a.stl\", \"b.stl\"]")) {
     if (value.is_table()) {
@@ -88,7 +99,7 @@ void read_meshes(const TomlValue& list, const SceneSettings& scene, fs::path& me
     }
     std::optional<GeneratedMesh> none;
     fs::path part;
-    read_mesh(value, scene, part, none);
+    read_mesh(value, reading, part, none);
     parts.push_back(std::move(part));
   }
   if (!list) return;
@@ -97,13 +108,13 @@ void read_meshes(const TomlValue& list, const SceneSettings& scene, fs::path& me
 }
 
 /// Reads the key `mesh` or the key `meshes` of a body.
-void read_shape(const TomlValue& mesh, const TomlValue& meshes, const SceneSettings& scene, fs::path& file,
+void read_shape(const TomlValue& mesh, const TomlValue& meshes, const SceneReading& reading, fs::path& file,
                 std::optional<GeneratedMesh>& generated, std::vector<fs::path>& parts) {
   if (mesh && meshes) return meshes.reject("the body has a mesh already; keep one of 'mesh' and 'meshes'");
   if (meshes)
-    read_meshes(meshes, scene, file, parts);
+    read_meshes(meshes, reading, file, parts);
   else
-    read_mesh(mesh, scene, file, generated);
+    read_mesh(mesh, reading, file, generated);
 }
 
 void read_body_kind(const TomlValue& key, BodyKind& kind) {
@@ -157,9 +168,10 @@ void read_inertia(TomlTable& table, ToolSettings& tool) {
 }
 
 /// The mass may be in [tool] or at the top of the file.
-void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
+void read_tool(TomlTable& table, const SceneReading& reading, const TomlValue& top_mass) {
+  SceneSettings& scene = reading.scene;
   const TomlValue meshes = table.optional("meshes");
-  read_shape(table.mandatory_unless("meshes", "mesh"), meshes, scene, scene.tool.mesh, scene.tool.generated,
+  read_shape(table.mandatory_unless("meshes", "mesh"), meshes, reading, scene.tool.mesh, scene.tool.generated,
              scene.tool.parts);
   read_body_kind(table.optional("kind"), scene.tool.kind);
   read_inertia(table, scene.tool);
@@ -212,10 +224,10 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
 }
 
 void read_mesh_obstacle(const TomlValue& mesh, const TomlValue& meshes, const MeshKeys& keys,
-                        SceneSettings& scene, const std::string& name) {
+                        const SceneReading& reading, const std::string& name) {
   MeshObstacleSettings obstacle;
   obstacle.name = name;
-  read_shape(mesh, meshes, scene, obstacle.mesh, obstacle.generated, obstacle.parts);
+  read_shape(mesh, meshes, reading, obstacle.mesh, obstacle.generated, obstacle.parts);
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();
@@ -223,11 +235,11 @@ void read_mesh_obstacle(const TomlValue& mesh, const TomlValue& meshes, const Me
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
   read_body_kind(keys.kind, obstacle.kind);
   read_motion(keys, obstacle.motion);
-  scene.meshes.push_back(obstacle);
+  reading.scene.meshes.push_back(obstacle);
 }
 
 /// Each obstacle has one shape: half_space, mesh or meshes.
-void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
+void read_obstacle(TomlTable& table, const SceneReading& reading, const std::string& place) {
   std::string name = place;
   table.optional("name").text(name);
   const TomlValue mesh = table.optional("mesh"), meshes = table.optional("meshes");
@@ -240,7 +252,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   if (mesh || meshes) {
     if (half_space)
       half_space.reject("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
-    return read_mesh_obstacle(mesh, meshes, keys, scene, name);
+    return read_mesh_obstacle(mesh, meshes, keys, reading, name);
   }
   if (keys.kind) keys.kind.reject("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
@@ -249,15 +261,16 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
     if (key) key.reject("belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
-  if (half_space) scene.half_spaces.push_back(settings);
+  if (half_space) reading.scene.half_spaces.push_back(settings);
 }
 
-void read_scene(TomlTable& table, SceneSettings& scene) {
+void read_scene(TomlTable& table, const SceneReading& reading) {
+  SceneSettings& scene = reading.scene;
   const TomlValue mass = table.optional("mass", "kg");
   table.optional("surface_tolerance_m").number(scene.surface_tolerance_m, kSurfaceTolerance_m);
-  table.mandatory("tool").table(read_tool, scene, mass);
+  table.mandatory("tool").table(read_tool, reading, mass);
   for (const TomlValue& obstacle : table.optional("obstacle").elements("tables, each headed [[obstacle]]")) {
-    obstacle.table(read_obstacle, scene, obstacle.name());
+    obstacle.table(read_obstacle, reading, obstacle.name());
   }
 }
 
@@ -268,32 +281,37 @@ bool has_name(const SceneSettings& scene, const std::string& name) {
 }
 
 /// Reads an added obstacle. It needs a unique name, because clients move and remove it by name.
-void read_added(TomlTable& table, SceneSettings& scene) {
+void read_added(TomlTable& table, const SceneReading& reading) {
+  const SceneSettings& scene = reading.scene;
   std::string name;
   const TomlValue key = table.optional("name");
   if (key.text(name) && has_name(scene, name))
     key.reject("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
   for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
     if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
-  read_obstacle(table, scene, name);
+  read_obstacle(table, reading, name);
 }
 
 }  // namespace
 
-void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene) {
+void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene,
+                  const FileScope& scope) {
   SceneSettings extended = scene;
-  read_toml_node(source, obstacle, read_added, extended);
+  read_toml_node(source, obstacle, read_added, SceneReading{extended, scope});
   scene = std::move(extended);
 }
 
-SceneSettings load_scene(const std::filesystem::path& file) {
-  return load_scene(read_toml_file(file), file);
+SceneSettings load_scene(const std::filesystem::path& file, const FileScope& scope) {
+  std::string text = read_config_text(file, scope);
+  SceneSettings scene = load_scene(read_toml_text(text, file), file, scope);
+  scene.text = std::move(text);
+  return scene;
 }
 
-SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file) {
+SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file, const FileScope& scope) {
   SceneSettings scene;
   scene.file = file;
-  read_toml_node(file, tree, read_scene, scene);
+  read_toml_node(file, tree, read_scene, SceneReading{scene, scope});
   return scene;
 }
 

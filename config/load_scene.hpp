@@ -11,13 +11,16 @@ namespace wrenchd {
 
 /// Reads a scene; format: config/scenes/cube_on_table.toml. Mesh paths are returned relative to the current
 /// directory or absolute, normals as unit vectors. A scene without obstacles is free space. Throws
-/// ConfigError. Not RT-safe: reads a file.
-SceneSettings load_scene(const std::filesystem::path& file);
+/// ConfigError. scope: where the scene and its meshes may be. Not RT-safe: reads a file.
+SceneSettings load_scene(const std::filesystem::path& file, const FileScope& scope = {});
 /// Converts a scene that was read from `file` before.
-SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file);
+SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file,
+                         const FileScope& scope = {});
 
 /// Adds an obstacle, given as a table like an [[obstacle]] of a scene file; its mesh is searched beside the
-/// scene. source: for messages. Throws ConfigError, also if its name is in use. Not RT-safe: allocates.
-void add_obstacle(const TomlNode& obstacle, const std::filesystem::path& source, SceneSettings& scene);
+/// scene. source: for messages. scope: where its mesh may be. Throws ConfigError, also if its name is in use.
+/// Not RT-safe: allocates.
+void add_obstacle(const TomlNode& obstacle, const std::filesystem::path& source, SceneSettings& scene,
+                  const FileScope& scope = {});
 
 }  // namespace wrenchd

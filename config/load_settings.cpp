@@ -20,14 +20,17 @@ void change_rendering(const TomlNode& changes, const fs::path& source, Settings&
 }
 
 Settings load_settings(const fs::path& file, const SearchPath& search) {
-  return load_settings(read_toml_file(file), file, search);
+  std::string text = read_config_text(file);
+  Settings settings = load_settings(read_toml_text(text, file), file, search);
+  settings.text = std::move(text);
+  return settings;
 }
 
 Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search) {
   Settings settings;
   settings.file = file;
   read_toml_node(file, tree, read_settings, SettingContext{search, file}, settings);
-  load_hand_script(settings.simulation.hand_script, settings.simulation);
+  settings.hand_script_text = load_hand_script(settings.simulation.hand_script, settings.simulation);
   return settings;
 }
 

@@ -184,7 +184,7 @@ bool equal(const std::vector<TimedPose>& a, const std::vector<TimedPose>& b) {
 
 // clang-format off
 constexpr std::array kTable = {
-    WRENCHD_SETTING("", "description", "", none, description, value.text(out)),
+    WRENCHD_SETTING("", "description", "", none, description, value.paragraphs(out)),
     WRENCHD_SETTING("", "scene", "", scene, scene, read_file_name(value, context, out)),
     WRENCHD_SETTING("device", "profile", "", restart, device.profile, read_profile(value, context, settings.device)),
     WRENCHD_SETTING("device", "serial", "", restart, device.serial, value.text(out)),

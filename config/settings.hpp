@@ -107,7 +107,7 @@ struct ViewSettings {
 /// Settings of wrenchd.toml.
 struct Settings {
   std::filesystem::path file;
-  std::string description;  ///< description of the scene and what to try, for display
+  std::string description;            ///< description of the scene and what to try, for display
   std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< searched along the search path
   DeviceSettings device;
   ServoSettings servo;
@@ -118,6 +118,8 @@ struct Settings {
   RecordingSettings recording;
   ControlSettings control;
   ViewSettings view;
+  std::string text = {};              ///< content of the file as it was read; empty: not from a file
+  std::string hand_script_text = {};  ///< content of simulation.hand_script as it was read
 };
 
 }  // namespace wrenchd

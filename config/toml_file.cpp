@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <string_view>
 
@@ -16,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The largest shipped file has 8 kB. A file above 1 MiB is a mesh or a recording.
-constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr std::uint64_t kMaxBytes = 1 << 20;
 
 /// wrenchd's formats nest four levels.
 constexpr int kMaxDepth = 16;
@@ -25,30 +24,19 @@ constexpr int kMaxDepth = 16;
 /// with 500,000 dots would overflow the stack. wrenchd's formats need less than a tenth of this limit.
 constexpr std::ptrdiff_t kMaxDotsInLine = 120;
 
-void require_regular_file(const fs::path& file) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) {
-    throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
+std::string read_text(const fs::path& file, const FileScope& scope) {
+  try {
+    return read_file(file, kMaxBytes, scope);
+  } catch (const FileError& error) {
+    switch (error.problem()) {
+      case FileProblem::missing:
+        throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
+      case FileProblem::too_large:
+        throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
+      default:
+        throw ConfigError(file, {}, error.what());
+    }
   }
-  if (error) throw ConfigError(file, {}, "cannot be read: " + error.message());
-  if (fs::is_directory(status)) throw ConfigError(file, {}, "is a directory; name a file in it");
-  if (!fs::is_regular_file(status)) throw ConfigError(file, {}, "is not a regular file; name a TOML file");
-}
-
-std::string read_text(const fs::path& file) {
-  require_regular_file(file);
-  std::error_code error;
-  const std::uintmax_t bytes = fs::file_size(file, error);
-  if (bytes > kMaxBytes) {
-    throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw ConfigError(file, {}, "cannot be opened; check that this user may read it");
-  std::string text(static_cast<std::size_t>(bytes), '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return text;
 }
 
 void reject_many_dots(const fs::path& file, std::string_view text) {
@@ -115,12 +103,12 @@ std::string syntax_message(std::string_view description) {
 
 }  // namespace
 
-std::string read_config_text(const fs::path& file) {
-  return read_text(file);
+std::string read_config_text(const fs::path& file, const FileScope& scope) {
+  return read_text(file, scope);
 }
 
 TomlNode read_toml_file(const fs::path& file) {
-  return read_toml_text(read_text(file), file);
+  return read_toml_text(read_text(file, {}), file);
 }
 
 TomlNode read_toml_text(const std::string& text, const fs::path& file) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/config_error.hpp"
+#include "core/files/opened_file.hpp"
 
 namespace wrenchd {
 
@@ -24,6 +25,12 @@ struct TomlNode {
   Value value;
 };
 
+/// A configuration file as it was read.
+struct ConfigText {
+  std::filesystem::path file;
+  std::string text;
+};
+
 /// One `key = value`; location is that of the key.
 struct TomlEntry {
   std::string key;
@@ -35,9 +42,9 @@ struct TomlEntry {
 /// regular, is larger than 1 MiB or nested too deeply, or is not valid UTF-8 or TOML. Not RT-safe: reads a
 /// file.
 TomlNode read_toml_file(const std::filesystem::path& file);
-/// Returns the text of a configuration file, with the checks of read_toml_file() that need no parser. Throws
-/// ConfigError. Not RT-safe: reads a file.
-std::string read_config_text(const std::filesystem::path& file);
+/// Returns the text of a configuration file, with the checks of read_toml_file() that need no parser. scope:
+/// where the file may be. Throws ConfigError. Not RT-safe: reads a file.
+std::string read_config_text(const std::filesystem::path& file, const FileScope& scope = {});
 /// Parses text; `file` is for messages.
 TomlNode read_toml_text(const std::string& text, const std::filesystem::path& file);
 

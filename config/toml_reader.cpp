@@ -98,7 +98,7 @@ bool TomlValue::boolean(bool& out) const {
   return true;
 }
 
-bool TomlValue::text(std::string& out) const {
+bool TomlValue::paragraphs(std::string& out) const {
   if (!node_) return false;
   const auto* s = std::get_if<std::string>(&node_->value);
   if (!s) return reject_found("a text between quotation marks");
@@ -106,10 +106,20 @@ bool TomlValue::text(std::string& out) const {
   return true;
 }
 
+bool TomlValue::text(std::string& out) const {
+  std::string line;
+  if (!paragraphs(line)) return false;
+  if (std::any_of(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    return reject_found("one line without control characters");
+  out = std::move(line);
+  return true;
+}
+
 bool TomlValue::path(std::filesystem::path& out) const {
   std::string name;
-  if (!text(name)) return false;
+  if (!paragraphs(name)) return false;
   if (name.find('\0') != std::string::npos) return reject_found("a file name without a zero byte");
+  if (!text(name)) return false;
   out = name;
   return true;
 }

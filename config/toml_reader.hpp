@@ -55,7 +55,10 @@ class TomlValue {
   template <std::integral T>
   bool integer(T& out, Range range) const;  ///< accepts 45.0, rejects 45.5
   bool boolean(bool& out) const;
+  /// One line. Rejects control characters, because names reach logs, status lines and udev rules.
   bool text(std::string& out) const;
+  /// A text of any number of lines.
+  bool paragraphs(std::string& out) const;
   bool path(std::filesystem::path& out) const;
   template <typename E>
   bool choice(E& out, std::initializer_list<std::pair<std::string_view, E>> choices) const;

@@ -78,6 +78,7 @@ bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWa
         if (choice.selection) {
           config.profile = known.profiles[choice.selection->profile];
           config.settings.device.profile_file = known.files[choice.selection->profile];
+          config.profile_texts = known.texts[choice.selection->profile];
           return true;
         }
         if (!reported) {

@@ -50,7 +50,7 @@ RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search)
                                               : find_file(profile_file(files.profile), search);
   }
   if (const auto& file = config.settings.device.profile_file; !file.empty())
-    config.profile = load_profile(file, search);
+    config.profile = load_profile(file, search, &config.profile_texts);
   config.simulated =
       files.simulate || (!config.profile.name.empty() && config.profile.transport == Transport::loopback);
   config.scene = load_scene(config.settings.scene);
@@ -77,8 +77,8 @@ Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMo
                  const MeshLoader& meshes)
     : Runtime(std::move(config), link, clock, search_mode, meshes, meshes) {}
 
-/// `used` reads the scene and keeps the warnings. `fresh` has read nothing: the reconfigurator copies it for
-/// each reload.
+/// `used` reads the scene and keeps the warnings and the files. `fresh` has read nothing: the reconfigurator
+/// copies it for each scene that is loaded.
 Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
                  const MeshLoader& fresh, MeshLoader used)
     : config_(std::move(config)),
@@ -92,7 +92,7 @@ Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMo
                 0, config_.settings, config_.profile, scene_,
                 make_proxy_initializer(scene_, search_mode, config_.settings.rendering.contacts)),
             clock),
-      reconfigurator_(config_, scene_, loop_, search_mode, fresh) {
+      reconfigurator_(config_, scene_, loop_, search_mode, fresh, used) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());
 }
 
@@ -113,7 +113,7 @@ RecordingHeader Runtime::recording_header() const {
   const auto scene = reconfigurator_.present_scene();
   header.scene = scene->text;
   header.scene_file = scene->settings.file;
-  add_meshes(scene->settings, header);
+  add_meshes(scene->settings, *scene->meshes, header);
   set_start_time(clock_, header);
   return header;
 }

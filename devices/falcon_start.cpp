@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
+
+#include "core/files/opened_file.hpp"
 
 namespace wrenchd {
 namespace {
@@ -110,9 +110,9 @@ void falcon_open(SerialChip& chip, const std::string& firmware_file) {
         "Falcon: it runs no firmware, and none is named; write a profile that inherits falcon, with the file "
         "of "
         "the manufacturer's SDK as firmware in [endpoints]");
-  std::ifstream file(firmware_file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file || bytes.empty())
+  constexpr std::uint64_t kMaxFirmwareBytes = std::uint64_t{1} << 24;
+  const std::string bytes = read_file_if_readable(firmware_file, kMaxFirmwareBytes).value_or("");
+  if (bytes.empty())
     throw std::runtime_error("Falcon: cannot read the firmware " + firmware_file +
                              "; set the file of the manufacturer's SDK");
   falcon_start(chip, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});

@@ -7,13 +7,13 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 
 #include <fcntl.h>
 #include <linux/hidraw.h>
 #include <linux/input.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "config/config_error.hpp"
@@ -39,15 +39,16 @@ bool is_text(std::string_view content) {
                      [](char c) { return kBlanks.find(c) != kBlanks.npos || (c > ' ' && c <= '~'); });
 }
 
-/// Closes its file descriptor on destruction.
-class OpenFile {
+/// A file or a device that is opened once. Closes its file descriptor on destruction.
+class OpenSource {
  public:
-  explicit OpenFile(const fs::path& file) : fd_(open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
-  ~OpenFile() {
+  explicit OpenSource(const fs::path& file)
+      : fd_(open(file.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {}
+  ~OpenSource() {
     if (fd_ >= 0) close(fd_);
   }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
+  OpenSource(const OpenSource&) = delete;
+  OpenSource& operator=(const OpenSource&) = delete;
   int fd() const noexcept { return fd_; }
 
  private:
@@ -67,11 +68,7 @@ void take_device(int fd, DescriptorSource& source) {
   source.device = std::string(ids.data()) + (name[0] == '\0' ? "" : ", \"" + printable(name.data()) + '"');
 }
 
-DescriptorSource ask_kernel(const fs::path& file) {
-  const OpenFile node(file);
-  if (node.fd() < 0 && (errno == EACCES || errno == EPERM))
-    reject(file, "cannot be opened by this user; run as root, or grant access with a udev rule");
-  if (node.fd() < 0) reject(file, std::string("cannot be opened: ") + std::strerror(errno));
+DescriptorSource ask_kernel(const OpenSource& node, const fs::path& file) {
   int size = 0;
   if (ioctl(node.fd(), HIDIOCGRDESCSIZE, &size) < 0)
     reject(file, "is not a hidraw device; name a /dev/hidrawN, or a file with a report descriptor");
@@ -85,12 +82,17 @@ DescriptorSource ask_kernel(const fs::path& file) {
 }
 
 /// Reads until the end, because files in /sys have no known size.
-std::string content_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) reject(file, "cannot be opened; check that this user may read it");
+std::string content_of(const OpenSource& source, const fs::path& file) {
   std::string content(kMaxTextBytes + 1, '\0');
-  stream.read(content.data(), static_cast<std::streamsize>(content.size()));
-  content.resize(static_cast<std::size_t>(stream.gcount()));
+  std::size_t used = 0;
+  while (used < content.size()) {
+    const ssize_t got = read(source.fd(), content.data() + used, content.size() - used);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) reject(file, std::string("cannot be read: ") + std::strerror(errno));
+    if (got == 0) break;
+    used += static_cast<std::size_t>(got);
+  }
+  content.resize(used);
   if (content.size() > kMaxTextBytes)
     reject(file, "is larger than 1 MiB; a report descriptor has at most 4096 bytes");
   if (content.empty()) reject(file, "is empty; check whether the device is still connected");
@@ -137,17 +139,20 @@ std::vector<std::uint8_t> parse_hex_text(std::string_view text) {
 }
 
 DescriptorSource read_descriptor_source(const fs::path& file) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found)
+  const OpenSource source(file);
+  if (source.fd() < 0 && errno == ENOENT)
     reject(file, "no such file; name a /dev/hidrawN, or a file with a report descriptor");
-  if (error) reject(file, "cannot be read: " + error.message());
-  if (fs::is_character_file(status)) return ask_kernel(file);
-  if (!fs::is_regular_file(status))
+  if (source.fd() < 0 && (errno == EACCES || errno == EPERM))
+    reject(file, "cannot be opened by this user; run as root, or grant access with a udev rule");
+  if (source.fd() < 0) reject(file, std::string("cannot be opened: ") + std::strerror(errno));
+  struct stat status {};
+  if (fstat(source.fd(), &status) != 0) reject(file, std::string("cannot be read: ") + std::strerror(errno));
+  if (S_ISCHR(status.st_mode)) return ask_kernel(source, file);
+  if (!S_ISREG(status.st_mode))
     reject(file,
            "is neither a hidraw device nor a regular file; name a /dev/hidrawN, or a file with a report "
            "descriptor");
-  const std::string content = content_of(file);
+  const std::string content = content_of(source, file);
   if (!is_text(content)) return {{content.begin(), content.end()}, file.string(), {}, {}};
   try {
     return {parse_hex_text(content), file.string(), {}, {}};

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -19,6 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/files/opened_file.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/servo/loop_timing.hpp"
 #include "daemon/version.hpp"
@@ -50,8 +49,7 @@ Finding ok(std::string summary) {
 
 /// Returns the text of a file without its line end; empty if the file cannot be read.
 std::string content(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::string text = read_file_if_readable(file).value_or("");
   while (!text.empty() && (text.back() == '\n' || text.back() == '\0')) text.pop_back();
   return text;
 }

@@ -5,10 +5,13 @@
 #include <array>
 #include <cstdio>
 #include <map>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "config/config_error.hpp"
+#include "core/profile_name.hpp"
 #include "daemon/version.hpp"
 #include "devices/discovery/unusable_devices.hpp"
 
@@ -86,6 +89,10 @@ std::string udev_rules(std::span<const DeviceProfile> profiles) {
   WantedById wanted;
   std::map<std::uint16_t, std::string> vendors;  ///< names of the profiles that match by vendor and layout
   for (const DeviceProfile& profile : profiles) {
+    // A line feed in a name would begin a rule, which root executes.
+    if (!is_profile_name(profile.name))
+      throw std::invalid_argument("a profile has a name that no profile may have: '" +
+                                  printable(profile.name) + "'; use letters, digits, '_', '.' and '-'");
     if (profile.transport == Transport::loopback) continue;
     for (const auto* ids : {&profile.match.usb, &profile.match.usb_by_layout})
       for (const UsbId id : *ids) want(wanted, profile, id);

@@ -18,8 +18,8 @@ namespace wrenchd {
 ///   - The device moves no pointer, even if its usage page makes the kernel create an input device.
 ///   - Connecting the device starts the service, unless its profile requires explicit selection.
 ///
-/// The rules have one block per id, sorted. The first lines name the version that created them. Not RT-safe:
-/// allocates.
+/// The rules have one block per id, sorted. The first lines name the version that created them. Throws
+/// std::invalid_argument if the name of a profile is not is_profile_name(). Not RT-safe: allocates.
 std::string udev_rules(std::span<const DeviceProfile> profiles);
 
 }  // namespace wrenchd

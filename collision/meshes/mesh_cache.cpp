@@ -92,6 +92,14 @@ std::string header(const std::string& key, std::string_view bytes) {
 
 }  // namespace
 
+std::string sha256_text(std::string_view bytes) {
+  std::string hash(kHash, '\0');
+  if (EVP_Digest(bytes.data(), bytes.size(), reinterpret_cast<unsigned char*>(hash.data()), nullptr,
+                 EVP_sha256(), nullptr) != 1)
+    throw std::runtime_error("OpenSSL has no SHA-256");
+  return hexadecimal(hash);
+}
+
 std::string MeshCache::key(const std::vector<std::string_view>& made_from) {
   std::vector<std::string_view> parts = made_from;
   parts.push_back(WRENCHD_MESH_SOURCES);
@@ -105,6 +113,7 @@ fs::path MeshCache::path_of(const std::string& key) const {
 std::optional<std::string> MeshCache::read(const std::string& key) const {
   if (disabled()) return {};
   const fs::path name = path_of(key);
+  // Not OpenedFile: the cache follows no link, and requires owner and mode of the file.
   const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return {};

@@ -41,6 +41,9 @@ class MeshCache {
   std::string error_;
 };
 
+/// Returns the SHA-256 of these bytes, in hexadecimal. Not RT-safe: allocates.
+std::string sha256_text(std::string_view bytes);
+
 /// Returns the cache directory: $CACHE_DIRECTORY (set by systemd for a service, /var/cache/wrenchd),
 /// otherwise $XDG_CACHE_HOME/wrenchd, otherwise ~/.cache/wrenchd. Empty if none of these is set. Not RT-safe:
 /// allocates.

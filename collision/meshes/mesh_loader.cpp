@@ -116,15 +116,63 @@ void MeshLoader::add(const std::filesystem::path& name, PolygonSoup soup) {
 std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind,
                                                    const std::optional<GeneratedMesh>& made) {
   if (const auto added = added_.find(file); added != added_.end()) {
-    auto& loaded = loaded_[{file, kind}];
+    const Key key{file, kind};
+    auto& loaded = loaded_[key];
     if (!loaded) loaded = std::make_shared<const LoadedMesh>(check_added(*added->second, file, kind));
-    return with_changes(loaded, kind);
+    return use(key, loaded, {});
   }
-  std::error_code error;
-  const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
-  auto& loaded = loaded_[{error || made ? file : same, kind}];
+  const Key key = key_of(file, kind, !made);
+  auto& loaded = loaded_[key];
   if (!loaded) loaded = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
-  return with_changes(loaded, kind);
+  return use(key, loaded, {file});
+}
+
+/// Two names of one file have one key. A restricted loader follows no links, not even for the key.
+MeshLoader::Key MeshLoader::key_of(const std::filesystem::path& file, BodyKind kind, bool is_file) const {
+  if (!is_file) return {file, kind};
+  if (scope_.restricted()) return {std::filesystem::absolute(file).lexically_normal(), kind};
+  std::error_code error;
+  std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
+  return {error ? file : std::move(same), kind};
+}
+
+/// Notes that the scene uses a mesh. files: the names of its files in the scene.
+std::shared_ptr<const LoadedMesh> MeshLoader::use(const Key& key,
+                                                  const std::shared_ptr<const LoadedMesh>& loaded,
+                                                  const std::vector<std::filesystem::path>& files) {
+  used_.insert(key);
+  for (std::size_t i = 0; i < std::min(files.size(), loaded->inputs.size()); ++i)
+    inputs_[files[i]] = loaded->inputs[i];
+  return with_changes(loaded, key.second);
+}
+
+void MeshLoader::begin_scene() {
+  changes_.clear();
+  simplifications_.clear();
+  warnings_.clear();
+  used_.clear();
+  inputs_.clear();
+}
+
+void MeshLoader::drop_unused() {
+  std::erase_if(loaded_, [this](const auto& entry) { return !used_.contains(entry.first); });
+}
+
+const MeshInput* MeshLoader::input(const std::filesystem::path& file) const {
+  const auto found = inputs_.find(file);
+  return found == inputs_.end() ? nullptr : &found->second;
+}
+
+/// Returns the bytes of a file, or its SHA-256 alone if too many bytes are kept already.
+MeshInput MeshLoader::keep(const MeshSource& source) {
+  MeshInput input{std::filesystem::absolute(source.file).lexically_normal(), sha256_text(source.bytes), {}};
+  std::size_t kept = 0;
+  for (const auto& bytes : kept_)
+    if (const auto alive = bytes.lock()) kept += alive->size();
+  if (kept + source.bytes.size() > kMaxKeptBytes) return input;
+  input.bytes = std::make_shared<const std::string>(source.bytes);
+  kept_.push_back(input.bytes);
+  return input;
 }
 
 /// Adds the changes of a mesh to those of the loader.
@@ -159,18 +207,18 @@ LoadedMesh MeshLoader::repair_and_check(PolygonSoup soup, const std::filesystem:
 std::shared_ptr<const LoadedMesh> MeshLoader::load_parts(const std::vector<std::filesystem::path>& files,
                                                          BodyKind kind) {
   std::string names;
-  for (const std::filesystem::path& file : files) {
-    std::error_code error;
-    const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
-    names += "part " + (error ? file : same).string() + '\n';  // no file name begins so
-  }
-  auto& loaded = loaded_[{names, kind}];
-  if (loaded) return with_changes(loaded, kind);
+  for (const std::filesystem::path& file : files)
+    names += "part " + key_of(file, kind, true).first.string() + '\n';  // no file name begins so
+  const Key key{names, kind};
+  auto& loaded = loaded_[key];
+  if (loaded) return use(key, loaded, files);
   std::vector<MeshSource> sources;
+  std::vector<MeshInput> inputs;
   std::vector<std::string> extensions;
   std::size_t bytes = 0;
   for (const std::filesystem::path& file : files) {
-    sources.push_back(read_mesh_source(file));
+    sources.push_back(read_mesh_source(file, scope_));
+    inputs.push_back(keep(sources.back()));
     extensions.push_back(file.extension().string());
     bytes += sources.back().bytes.size();
   }
@@ -185,8 +233,9 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load_parts(const std::vector<std::
               " more: uniting the parts");
   LoadedMesh made = cached<LoadedMesh>(made_from, large, [&] { return join_parts(sources, kind); });
   made.file = files.front();
+  made.inputs = std::move(inputs);
   loaded = std::make_shared<const LoadedMesh>(std::move(made));
-  return with_changes(loaded, kind);
+  return use(key, loaded, files);
 }
 
 LoadedMesh MeshLoader::join_parts(std::vector<MeshSource> sources, BodyKind kind) const {
@@ -228,7 +277,8 @@ LoadedMesh MeshLoader::join_parts(std::vector<MeshSource> sources, BodyKind kind
 }
 
 LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
-  MeshSource source = read_mesh_source(file);
+  const MeshSource source = read_mesh_source(file, scope_);
+  MeshInput input = keep(source);
   const std::size_t size = source.bytes.size();
   const bool large = size >= kLargeMeshBytes;
   if (progress_ && large)
@@ -237,6 +287,7 @@ LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   LoadedMesh loaded = cached<LoadedMesh>({"mesh", extension, body_kind_name(kind), source.bytes}, large,
                                          [&] { return repair_and_check(parse_mesh(source), file, kind); });
   loaded.file = file;
+  loaded.inputs.push_back(std::move(input));
   return loaded;
 }
 

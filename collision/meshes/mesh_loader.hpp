@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "collision/meshes/mesh_cache.hpp"
 #include "collision/meshes/mesh_size.hpp"
 #include "core/convex_body.hpp"
+#include "core/files/opened_file.hpp"
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
@@ -23,6 +25,13 @@ namespace wrenchd {
 struct MeshReport;
 struct MeshSource;
 struct PolygonSoup;
+
+/// A mesh file as the loader has read it.
+struct MeshInput {
+  std::filesystem::path file;                ///< absolute name
+  std::string sha256;                        ///< SHA-256 of the file, in hexadecimal
+  std::shared_ptr<const std::string> bytes;  ///< null beyond MeshLoader::kMaxKeptBytes
+};
 
 /// A mesh that was read from a file, repaired and checked, or a mesh that was generated and checked.
 struct LoadedMesh {
@@ -32,9 +41,14 @@ struct LoadedMesh {
   std::vector<std::string> repairs;
   /// True if parts of a solid overlap, so that the volume in which they do counts twice.
   bool parts_overlap = false;
+  std::vector<MeshInput> inputs = {};  ///< one for each file; empty for a generated mesh
 };
 
 /// Loads meshes and prepares them for contact queries. It reads each file once, for any number of bodies.
+///
+/// The loader keeps the bytes of the files that it has read, up to 32 MiB in total, and the SHA-256 of all of
+/// them, so that a recording contains what was loaded. It also keeps the meshes themselves until
+/// drop_unused(): 12 bytes for a triangle and 24 bytes for a vertex.
 ///
 /// A million triangles take seconds. For large meshes the loader reports each step before it starts, and
 /// caches the result on disk (mesh_cache.hpp). Small meshes are neither reported nor cached. Not RT-safe:
@@ -46,11 +60,22 @@ class MeshLoader {
   /// uses the cache.
   static constexpr std::size_t kLargeMeshTriangles = 50'000;
   static constexpr std::size_t kLargeMeshBytes = 50 * kLargeMeshTriangles;
+  /// Total size of the files whose bytes the loader keeps.
+  static constexpr std::size_t kMaxKeptBytes = std::size_t{32} << 20;
 
   MeshLoader() : MeshLoader({}, {}) {}  ///< no cache, no progress reports
   /// cache: directory of the cache; empty: no cache. progress: receives "FILE: ...".
   MeshLoader(std::filesystem::path cache, Progress progress)
       : cache_(std::move(cache)), progress_(std::move(progress)) {}
+
+  /// Restricts the files that are read from now on.
+  void set_scope(FileScope scope) { scope_ = std::move(scope); }
+  /// Forgets the remarks of earlier scenes, and which meshes they use. Meshes that were loaded stay loaded.
+  void begin_scene();
+  /// Forgets the meshes that were not used since begin_scene().
+  void drop_unused();
+  /// Returns the file of this name as it was loaded; null if it was not, or if the mesh is generated.
+  const MeshInput* input(const std::filesystem::path& file) const;
 
   /// Makes load() use these polygons under this name, in place of a file. For meshes of programs.
   void add(const std::filesystem::path& name, PolygonSoup soup);
@@ -88,6 +113,12 @@ class MeshLoader {
   const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
+  using Key = std::pair<std::filesystem::path, BodyKind>;
+
+  Key key_of(const std::filesystem::path& file, BodyKind kind, bool is_file) const;
+  MeshInput keep(const MeshSource& source);
+  std::shared_ptr<const LoadedMesh> use(const Key& key, const std::shared_ptr<const LoadedMesh>& loaded,
+                                        const std::vector<std::filesystem::path>& files);
   LoadedMesh read(const std::filesystem::path& file, BodyKind kind);
   LoadedMesh make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind);
   LoadedMesh check_added(const PolygonSoup& soup, const std::filesystem::path& name, BodyKind kind);
@@ -107,7 +138,11 @@ class MeshLoader {
   std::vector<std::string> warnings_;
   std::map<std::filesystem::path, std::shared_ptr<const PolygonSoup>>
       added_;  ///< meshes of programs, by name
-  std::map<std::pair<std::filesystem::path, BodyKind>, std::shared_ptr<const LoadedMesh>> loaded_;
+  std::map<Key, std::shared_ptr<const LoadedMesh>> loaded_;
+  FileScope scope_;
+  std::set<Key> used_;                                  ///< since begin_scene()
+  std::map<std::filesystem::path, MeshInput> inputs_;   ///< by the name that load() received
+  std::vector<std::weak_ptr<const std::string>> kept_;  ///< the bytes of the inputs
 };
 
 /// Returns why a mesh cannot be used as a body of this kind and how to correct it: "FILE: ...", one line for

@@ -30,7 +30,11 @@ std::optional<T> parsed(std::string_view word) noexcept {
 }  // namespace
 
 void MeshSource::reject(std::size_t line, const std::string& message) const {
-  throw MeshError(file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " + message);
+  const std::string place = file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": ";
+  throw MeshError(place + message,
+                  place +
+                      "is not a mesh that can be used; 'wrenchctl mesh' states the reason to a "
+                      "user who may read the file");
 }
 
 bool LineReader::next(std::string_view& line) noexcept {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace wrenchd {
@@ -15,7 +16,15 @@ namespace wrenchd {
 /// line for each defect.
 class MeshError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit MeshError(const std::string& message) : MeshError(message, message) {}
+  /// public_text: the message without any content of the file.
+  MeshError(const std::string& message, std::string public_text)
+      : std::runtime_error(message), public_text_(std::move(public_text)) {}
+  /// The message for someone who may not read the file.
+  const std::string& public_text() const noexcept { return public_text_; }
+
+ private:
+  std::string public_text_;
 };
 
 /// The bytes of a mesh file, and its name for messages.
@@ -23,7 +32,8 @@ struct MeshSource {
   std::filesystem::path file;
   std::string bytes;
 
-  /// Throws MeshError "FILE: message", or "FILE:LINE: message" if line > 0. Not RT-safe: throws.
+  /// Throws MeshError "FILE: message", or "FILE:LINE: message" if line > 0. The message may quote the file,
+  /// so the public text of the error is another one. Not RT-safe: throws.
   [[noreturn]] void reject(std::size_t line, const std::string& message) const;
 };
 

@@ -8,9 +8,11 @@
 #include <stdexcept>
 
 #include <fcntl.h>
+#include <linux/sockios.h>
 #include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -27,6 +29,8 @@ constexpr std::uint64_t kWake = 1;
 constexpr int kAcceptPerRound = 16;
 /// Pause before the next accept() if the process has no free descriptors.
 constexpr Duration kAcceptPause = std::chrono::milliseconds(100);
+/// Pause before the next attempt if the kernel accepts no descriptor: too many are unread.
+constexpr Duration kSendPause = std::chrono::milliseconds(100);
 /// Cost of a read. It makes many small writes no cheaper than one large write.
 constexpr double kRead_lines = 0.25;
 /// Events for one client in one round, so that the backlog of one client does not delay the others.
@@ -143,6 +147,7 @@ int ControlSocket::wait_ms(TimePoint now) const {
   TimePoint until = lease_.next_check_at();
   if (accept_again_at_ > now) until = std::min(until, accept_again_at_);
   for (const auto& [number, client] : clients_) {
+    if (!client.output.empty() && client.send_again_at > now) until = std::min(until, client.send_again_at);
     if (client.close_after_flush || client.output_bytes >= kMaxUnsent_bytes) continue;
     if (client.end_of_input && !client.has_complete_line) continue;
     if (client.tokens <= 0.0)
@@ -195,7 +200,7 @@ void ControlSocket::accept_clients(TimePoint now) {
           "administrator to add you to the group of the observers.");
       continue;
     }
-    if (clients_.size() >= kMaxClients) evict_client();
+    if (!make_room_for(*peer, *role)) continue;
     Client client;
     client.number = ++last_client_number_;
     client.socket = std::move(socket);
@@ -211,7 +216,22 @@ void ControlSocket::accept_clients(TimePoint now) {
   }
 }
 
-void ControlSocket::evict_client() {
+/// Removes a connection if a new one would exceed a limit. Returns false if none can be removed.
+bool ControlSocket::make_room_for(const Peer& peer, Role role) {
+  const auto own = std::count_if(clients_.begin(), clients_.end(),
+                                 [&peer](const auto& one) { return one.second.peer.uid == peer.uid; });
+  const std::size_t before = clients_.size();
+  if (role == Role::observer && static_cast<std::size_t>(own) >= kMaxObserverClients)
+    evict_client(peer.uid);
+  else if (before >= kMaxClients)
+    evict_client({});
+  else
+    return true;
+  return clients_.size() < before;
+}
+
+/// Removes a connection of this user, or of the user with the most connections.
+void ControlSocket::evict_client(std::optional<uid_t> user) {
   std::map<uid_t, int> connections;
   for (const auto& [number, client] : clients_) ++connections[client.peer.uid];
   auto evicted = clients_.end();
@@ -222,12 +242,54 @@ void ControlSocket::evict_client() {
                                                         : a.last_received_at < b.last_received_at;
   };
   for (auto client = clients_.begin(); client != clients_.end(); ++client)
-    if (!lease_.held_by(client->first) &&
+    if (!lease_.held_by(client->first) && (!user || client->second.peer.uid == *user) &&
         (evicted == clients_.end() || before(client->second, evicted->second)))
       evicted = client;
+  if (evicted == clients_.end()) return;
   send_rejection(evicted->second.socket.get(),
                  "There are too many connections, and yours was silent for longest; connect again.");
   clients_.erase(evicted);
+}
+
+/// Returns how many descriptors the client keeps open outside of its own process: in replies that are not
+/// sent, and in the socket.
+std::size_t ControlSocket::held_fds(Client& client) {
+  int unread_bytes = 0;
+  if (client.unread_fds > 0 && ::ioctl(client.socket.get(), SIOCOUTQ, &unread_bytes) == 0 &&
+      unread_bytes == 0)
+    client.unread_fds = 0;  // the client has read all that was sent
+  return client.queued_fds + client.unread_fds;
+}
+
+/// Returns why the client may receive no descriptor now; empty if it may.
+std::string ControlSocket::reason_without_descriptor(Client& client) {
+  std::size_t of_user = 0, of_all = 0;
+  for (auto& [number, other] : clients_) {
+    const std::size_t held = held_fds(other);
+    of_all += held;
+    if (other.peer.uid == client.peer.uid) of_user += held;
+  }
+  const std::size_t most =
+      client.role == Role::administrator ? kMaxDescriptors : kMaxDescriptors - kReservedDescriptors;
+  if (held_fds(client) >= kMaxClientDescriptors)
+    return "Replies with descriptors wait for you; read them, and request this again.";
+  if (of_user >= kMaxUserDescriptors)
+    return "Replies with descriptors wait for other programs of your user; request this again when they have "
+           "read "
+           "them.";
+  if (of_all >= most) return "Too many replies with descriptors wait for clients; try again in a moment.";
+  return {};
+}
+
+/// Queues the reply to a method. has_fd: the result has a descriptor; without one the reply is an error.
+void ControlSocket::queue_reply(Client& client, const Json& id, std::string line, bool has_fd, OwnedFd fd) {
+  std::string reason;
+  if (has_fd && !fd)
+    reason = "The daemon has no free descriptor for the reply; try again in a moment.";
+  else if (has_fd)
+    reason = reason_without_descriptor(client);
+  if (reason.empty()) return queue_line(client, std::move(line), std::move(fd));
+  queue_line(client, error_line(id, RpcError(RpcCode::invalid_state, reason)));
 }
 
 /// Returns true if the client has tokens and reads its replies.
@@ -303,7 +365,7 @@ void ControlSocket::process_line(Client& client, std::string_view line) {
     if (!request.wants_reply) return;
     OwnedFd fd;
     if (answer.fd >= 0) fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
-    queue_line(client, reply_line(request.id, answer.result), std::move(fd));
+    queue_reply(client, request.id, reply_line(request.id, answer.result), answer.fd >= 0, std::move(fd));
   } catch (const RpcError& error) {
     if (request.wants_reply) queue_line(client, error_line(request.id, error));
   }
@@ -315,16 +377,18 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     throw RpcError(RpcCode::invalid_state, "Your last request of this kind still runs; wait for its reply.");
   Caller worker_caller = caller;
   worker_caller.subscription = nullptr;
-  const bool posted = worker_->post([this, &row, request, worker_caller] {
-    Finished finished{worker_caller.client, {}, {}};
+  const auto posted = worker_->post(client.peer.uid, client.role, [this, &row, request, worker_caller] {
+    Finished finished{worker_caller.client, {}, {}, false, request.id};
     try {
       const MethodResult answer = MethodTable::run(row, request.params, worker_caller);
-      if (answer.fd >= 0) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
+      finished.has_fd = answer.fd >= 0;
+      if (finished.has_fd) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {
       if (request.wants_reply) finished.line = error_line(request.id, error);
     } catch (const std::exception& error) {  // no memory for the reply
       finished.fd.reset();
+      finished.has_fd = false;
       if (request.wants_reply)
         finished.line = error_line(request.id, RpcError(RpcCode::internal_error, error.what()));
     }
@@ -334,7 +398,11 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     }
     notify(wake_fd_.get());
   });
-  if (!posted)
+  if (posted == WorkerQueue::Posted::user_has_too_many)
+    throw RpcError(RpcCode::invalid_state, "Other programs of your user wait for " +
+                                               std::to_string(WorkerQueue::kMaxQueuedPerUser) +
+                                               " requests of this kind; try again in a moment.");
+  if (posted == WorkerQueue::Posted::full)
     throw RpcError(RpcCode::invalid_state, "The queue of slow requests is full; try again in a moment.");
   ++client.pending_methods;
 }
@@ -349,7 +417,8 @@ void ControlSocket::send_finished_results() {
     const auto found = clients_.find(one.client);
     if (found == clients_.end()) continue;
     --found->second.pending_methods;
-    if (!one.line.empty()) queue_line(found->second, std::move(one.line), std::move(one.fd));
+    if (!one.line.empty())
+      queue_reply(found->second, one.id, std::move(one.line), one.has_fd, std::move(one.fd));
   }
 }
 
@@ -377,23 +446,34 @@ void ControlSocket::send_events(Client& client) {
 
 void ControlSocket::queue_line(Client& client, std::string line, OwnedFd fd) {
   client.output_bytes += line.size();
+  if (fd) ++client.queued_fds;
   client.output.push_back({std::move(line), 0, std::move(fd)});
 }
 
 void ControlSocket::flush(Client& client) {
+  if (client.send_again_at > wall_now()) return;
   while (!client.output.empty() && !client.to_remove) {
     Chunk& chunk = client.output.front();
     const std::string_view rest = std::string_view(chunk.bytes).substr(chunk.sent);
     const ssize_t sent = send_some(client.socket.get(), rest, chunk.fd.get());
-    if (sent < 0 && (errno == EAGAIN || errno == EINTR || errno == ENOBUFS || errno == ETOOMANYREFS)) return;
+    if (sent < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (sent < 0 && (errno == ENOBUFS || errno == ETOOMANYREFS)) {
+      client.send_again_at = wall_now() + kSendPause;
+      return;
+    }
     if (sent < 0) {  // the client does not read any more; its earlier requests are still processed
       client.output.clear();
       client.output_bytes = 0;
+      client.queued_fds = 0;
       client.subscription.active = false;
       if (!client.disconnected) client.to_remove = true;
       return;
     }
-    chunk.fd.reset();
+    if (chunk.fd) {
+      chunk.fd.reset();
+      --client.queued_fds;
+      ++client.unread_fds;
+    }
     chunk.sent += static_cast<std::size_t>(sent);
     if (chunk.sent < chunk.bytes.size()) continue;
     client.output_bytes -= chunk.bytes.size();
@@ -412,7 +492,9 @@ void ControlSocket::update_epoll_events(Client& client) {
   // The feed does not wake this thread for events that did not fit into this round. EPOLLOUT starts the next
   // one.
   const bool behind = client.subscription.active && client.subscription.has_backlog;
-  if (!client.output.empty() || behind) wanted |= EPOLLOUT;
+  // While the kernel accepts no descriptor, the socket is writable, and EPOLLOUT would wake this thread all
+  // the time. wait_ms() ends the pause.
+  if ((!client.output.empty() || behind) && client.send_again_at <= wall_now()) wanted |= EPOLLOUT;
   if (wanted == client.epoll_events) return;
   epoll_event event{};
   event.events = wanted;

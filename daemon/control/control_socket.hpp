@@ -25,6 +25,14 @@ namespace wrenchd {
 // not read a client that leaves its replies unread. A client that floods delays only itself.
 
 inline constexpr std::size_t kMaxClients = 32;
+/// Connections of one user without a higher role than observer. The other places stay free for other users.
+inline constexpr std::size_t kMaxObserverClients = 24;
+/// Descriptors that wait in replies, or that clients have not read yet, of one connection, of one user, and
+/// of all. Observers and operators together may use kMaxDescriptors minus kReservedDescriptors.
+inline constexpr std::size_t kMaxClientDescriptors = 4;
+inline constexpr std::size_t kMaxUserDescriptors = 16;
+inline constexpr std::size_t kMaxDescriptors = 64;
+inline constexpr std::size_t kReservedDescriptors = 16;
 /// Rate at which a client gains tokens. A line costs one token, plus one for each KiB; each read costs a
 /// quarter.
 inline constexpr double kLinesPerSecond = 500.0;
@@ -46,6 +54,10 @@ using IdentifyPeer = std::function<std::optional<Peer>(int socket)>;
 /// If kMaxClients are connected, a new client replaces one connection of the user with the most connections.
 /// Connections without a valid request come first, then the one that has been silent for longest. The holder
 /// of the lease is never replaced. So no user can lock out another, and every permitted user can always stop.
+/// An observer who has kMaxObserverClients connections replaces one of his own.
+///
+/// A reply without its descriptor would be a success that is none: if the process or the limits allow no
+/// descriptor, the client receives an error.
 class ControlSocket {
  public:
   /// Starts to serve. All arguments must outlive this object, and the table must not change any more. From
@@ -86,6 +98,9 @@ class ControlSocket {
     bool close_after_flush = false;   ///< close the connection when the output is sent
     bool to_remove = false;           ///< remove the client at the end of the round
     int pending_methods = 0;          ///< slow methods that run or are queued
+    std::size_t queued_fds = 0;       ///< descriptors in `output`
+    std::size_t unread_fds = 0;       ///< descriptors that were sent and may be unread
+    TimePoint send_again_at{};        ///< the kernel accepts no descriptor before
     Subscription subscription;
   };
 
@@ -93,13 +108,19 @@ class ControlSocket {
     std::uint64_t client = 0;
     std::string line;
     OwnedFd fd;
+    bool has_fd = false;  ///< the result has a descriptor, even if `fd` could not be made
+    Json id = nullptr;
   };
 
   void run(const std::stop_token& stop);
   int wait_ms(TimePoint now) const;
   void handle_epoll_event(std::uint64_t number, std::uint32_t events);
   void accept_clients(TimePoint now);
-  void evict_client();
+  bool make_room_for(const Peer& peer, Role role);
+  void evict_client(std::optional<uid_t> user);
+  std::string reason_without_descriptor(Client& client);
+  void queue_reply(Client& client, const Json& id, std::string line, bool has_fd, OwnedFd fd);
+  static std::size_t held_fds(Client& client);
   void serve(Client& client, TimePoint now);
   void read_input(Client& client, TimePoint now);
   void process_lines(Client& client);

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "config/scene_text.hpp"
+#include "config/search_path.hpp"
 #include "config/setting_table.hpp"
 #include "core/finite.hpp"
 #include "daemon/control/scene_cost.hpp"
@@ -25,13 +24,6 @@ constexpr auto kMaxWait = std::chrono::seconds(2);
 /// Largest gain of a local model. The loop scales the gain further to what is stable.
 constexpr double kMaxModelGain = 1e5;
 constexpr auto kWaitPeriod = std::chrono::milliseconds(5);
-
-std::string contents(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 /// "cube, post, floor"
 std::string names(const SceneSettings& scene) {
@@ -78,7 +70,7 @@ std::vector<std::string> names_of(const Scene& scene) {
 
 /// Returns a text that changes if a file of the scene changes.
 std::string files_fingerprint(const SceneSettings& scene) {
-  std::string text = scene.file.string() + '\n' + contents(scene.file);
+  std::string text = scene.file.string() + '\n' + scene.text;
   const auto add = [&text](const std::filesystem::path& mesh) {
     std::error_code error;
     text += '\n' + mesh.string() + ' ' + std::to_string(std::filesystem::file_size(mesh, error)) + ' ' +
@@ -108,34 +100,48 @@ std::string reason_not_to_apply(const Setting& setting, const Settings& present,
 }  // namespace
 
 Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                               ProxySearchMode proxy_search_mode, MeshLoader loader)
+                               ProxySearchMode proxy_search_mode, MeshLoader loader, MeshLoader loaded)
     : config_(std::move(config)),
       file_settings_(config_.settings),
-      profile_text_(contents(config_.settings.device.profile_file)),
+      profile_text_(config_.profile_texts.empty() ? "" : config_.profile_texts.front().text),
       scene_fingerprint_(files_fingerprint(config_.scene)),
       scene_(std::move(scene)),
       loop_(loop),
       proxy_search_mode_(proxy_search_mode),
       loader_(std::move(loader)),
+      loaded_(std::make_shared<const MeshLoader>(std::move(loaded))),
       contacts_(config_.settings.rendering.contacts),
       present_(std::make_shared<const PresentScene>(
-          PresentScene{config_.scene, contents(config_.scene.file), names_of(*scene_), 0})) {}
+          PresentScene{config_.scene, config_.scene.text, names_of(*scene_), 0, loaded_})) {}
 
-Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene) const {
-  MeshLoader loader = loader_;
-  auto built = std::make_shared<const Scene>(scene, loader);
-  std::vector<std::string> warnings = loader.changes();
-  warnings.insert(warnings.end(), loader.warnings().begin(), loader.warnings().end());
-  return {std::move(built), std::move(warnings)};
+/// Builds a scene. meshes: reads the files; meshes that it has loaded are used as they are.
+Reconfigurator::BuiltScene Reconfigurator::build_scene(const SceneSettings& scene, MeshLoader meshes,
+                                                       const FileScope& scope) {
+  meshes.set_scope(scope);
+  meshes.begin_scene();
+  auto built = std::make_shared<const Scene>(scene, meshes);
+  meshes.drop_unused();
+  std::vector<std::string> warnings = meshes.changes();
+  warnings.insert(warnings.end(), meshes.warnings().begin(), meshes.warnings().end());
+  return {std::move(built), std::move(warnings), std::make_shared<const MeshLoader>(std::move(meshes))};
 }
 
-/// Builds a scene whose obstacle motions start now, and sets their start times in `scene`.
-Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& scene) {
-  BuiltScene built = build_scene(scene);
+/// Builds a scene whose obstacle motions start now, and sets their start times in `scene`. Reads its files.
+Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& scene,
+                                                                const FileScope& scope) {
+  BuiltScene built = build_scene(scene, loader_, scope);
   start_motions(scene_time_s(), scene);
   if (built.scene->has_moving_obstacles())
     built.scene = std::make_shared<const Scene>(*built.scene, scene.meshes);
   return built;
+}
+
+FileScope Reconfigurator::client_scope() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::filesystem::path> directories = SearchPath().directories();
+  for (const std::filesystem::path& file : {file_settings_.file, file_settings_.scene})
+    if (!file.empty()) directories.push_back(std::filesystem::absolute(file).parent_path());
+  return FileScope::beneath(directories);
 }
 
 /// Virtual time has no warm-up: its result depends on the speed of the machine.
@@ -150,15 +156,16 @@ std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& setti
 }
 
 void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings& settings,
-                           SceneSettings scene, std::string text, std::shared_ptr<const Scene> built) {
+                           SceneSettings scene, std::string text, BuiltScene built) {
   config_.settings = settings;
   contacts_.store(settings.rendering.contacts);
   config_.scene = std::move(scene);
-  scene_ = std::move(built);
+  scene_ = std::move(built.scene);
+  loaded_ = std::move(built.meshes);
   rendering_id_ = rendering->id();
   checksum_ = rendering->checksum();
   auto present = std::make_shared<const PresentScene>(
-      PresentScene{config_.scene, std::move(text), names_of(*scene_), rendering_id_});
+      PresentScene{config_.scene, std::move(text), names_of(*scene_), rendering_id_, loaded_});
   {
     const std::lock_guard present_lock(present_mutex_);
     present_ = std::move(present);
@@ -166,33 +173,34 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
   loop_.requests().renderings().offer(std::move(rendering));
 }
 
-void Reconfigurator::replace_scene(const std::filesystem::path& file) {
+void Reconfigurator::replace_scene(const std::filesystem::path& file, const FileScope& scope) {
   const std::lock_guard lock(mutex_);
-  std::string text = read_config_text(file);
-  SceneSettings scene = load_scene(read_toml_text(text, file), file);
+  SceneSettings scene = load_scene(file, scope);
+  std::string text = scene.text;
   check_scene_cost(scene, config_.scene);
-  auto scene_built = build_starting_scene(scene).scene;
+  BuiltScene built = build_starting_scene(scene, scope);
   Settings settings = config_.settings;
   settings.scene = file;
-  auto rendering = build_rendering(settings, scene_built);
-  offer(std::move(rendering), settings, std::move(scene), std::move(text), std::move(scene_built));
+  auto rendering = build_rendering(settings, built.scene);
+  offer(std::move(rendering), settings, std::move(scene), std::move(text), std::move(built));
 }
 
-std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source) {
+std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
+                                            const FileScope& scope) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = config_.scene;
   const std::size_t half_spaces = scene.half_spaces.size();
-  add_obstacle(obstacle, source, scene);
+  add_obstacle(obstacle, source, scene, scope);
   check_scene_cost(scene, config_.scene);
   const bool is_half_space = scene.half_spaces.size() > half_spaces;
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, now);
-  auto scene_built = build_scene(scene).scene;
+  BuiltScene built = build_scene(scene, *loaded_, scope);
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
-  auto rendering = build_rendering(config_.settings, scene_built);
+  auto rendering = build_rendering(config_.settings, built.scene);
   std::string text = scene_text(scene, scene_time_s());
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(built));
   return name;
 }
 
@@ -203,10 +211,10 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
     reject_unknown(name, scene);
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
-  auto scene_built = build_scene(scene).scene;
-  auto rendering = build_rendering(config_.settings, scene_built);
+  BuiltScene built = build_scene(scene, *loaded_, FileScope());
+  auto rendering = build_rendering(config_.settings, built.scene);
   std::string text = scene_text(scene, scene_time_s());
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(built));
 }
 
 /// Waits until the loop has taken the last rendering and finished its crossfade. Otherwise an obstacle could
@@ -261,10 +269,10 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
                                 to_text(ObstacleMotion::kMaxAngularSpeed_rad_per_s) +
                                 " rad/s); give it at least duration_s = " + to_text(least_s));
   mesh->scheduled = {begin, X_begin, motion};
-  auto scene_built = std::make_shared<const Scene>(*scene_, scene.meshes);
-  auto rendering = build_rendering(config_.settings, scene_built);
+  BuiltScene built{std::make_shared<const Scene>(*scene_, scene.meshes), {}, loaded_};
+  auto rendering = build_rendering(config_.settings, built.scene);
   std::string text = scene_text(scene, scene_time_s());
-  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(scene_built));
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(built));
 }
 
 void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesystem::path& source) {
@@ -272,7 +280,7 @@ void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesyste
   Settings settings = config_.settings;
   change_rendering(changes, source, settings);
   auto rendering = build_rendering(settings, scene_);
-  offer(std::move(rendering), settings, config_.scene, present_scene()->text, scene_);
+  offer(std::move(rendering), settings, config_.scene, present_scene()->text, {scene_, {}, loaded_});
 }
 
 void Reconfigurator::set_workspace(const WorkspaceRequest& request) {
@@ -377,18 +385,19 @@ Reconfigurator::ReloadedSettings Reconfigurator::reload_settings(const Settings&
   return result;
 }
 
-bool Reconfigurator::is_profile_changed(const DeviceSettings& device) const {
-  return device.profile == file_settings_.device.profile && contents(device.profile_file) != profile_text_;
+bool Reconfigurator::is_profile_changed(const RunConfig& config) const {
+  return config.settings.device.profile == file_settings_.device.profile && !config.profile_texts.empty() &&
+         config.profile_texts.front().text != profile_text_;
 }
 
 /// Builds the scene if its name or one of its files has changed since the last reload.
 Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& scene) {
   std::string fingerprint = files_fingerprint(scene);
   if (fingerprint == scene_fingerprint_)
-    return {false, std::move(fingerprint), config_.scene, present_scene()->text, {scene_, {}}};
+    return {false, std::move(fingerprint), config_.scene, present_scene()->text, {scene_, {}, loaded_}};
   SceneSettings settings = scene;
-  std::string text = contents(scene.file);
-  BuiltScene built = build_starting_scene(settings);
+  std::string text = scene.text;
+  BuiltScene built = build_starting_scene(settings, FileScope());
   return {true, std::move(fingerprint), std::move(settings), std::move(text), std::move(built)};
 }
 
@@ -397,7 +406,7 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const RunConfig config = read();
   ReloadedSettings settings = reload_settings(config.settings);
   ReloadedScene scene = reload_scene(config.scene);
-  if (is_profile_changed(config.settings.device))
+  if (is_profile_changed(config))
     settings.not_applied.emplace_back("the device profile was changed: requires a restart");
   if (scene.changed) {
     settings.present.scene = settings.from_files.scene = config.settings.scene;
@@ -408,14 +417,15 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
     rendering = build_rendering(settings.present, scene.built.scene);
 
   // Everything is valid.
+  const std::vector<std::string> mesh_warnings = scene.built.mesh_warnings;
   if (settings.limits_changed) loop_.requests().set_limits(settings.present.limits);
   config_.settings = settings.present;
   file_settings_ = settings.from_files;
   scene_fingerprint_ = scene.fingerprint;
   if (rendering)
     offer(std::move(rendering), settings.present, std::move(scene.settings), std::move(scene.text),
-          std::move(scene.built.scene));
-  return {settings.applied, settings.not_applied, scene.built.mesh_warnings};
+          std::move(scene.built));
+  return {settings.applied, settings.not_applied, mesh_warnings};
 }
 
 Settings Reconfigurator::settings() const {

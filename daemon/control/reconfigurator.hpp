@@ -41,18 +41,24 @@ struct ReloadResult {
 /// seconds.
 class Reconfigurator {
  public:
-  /// config: what the loop runs with. scene: what the loop renders. loader: copied for each reload, so that
-  /// every mesh file is read again. The loop must outlive this object.
+  /// config: what the loop runs with. scene: what the loop renders. loader: copied for each scene that is
+  /// loaded, so that every mesh file is read again. loaded: has read the present scene; a change of an
+  /// obstacle reads only new files. The loop must outlive this object.
   Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                 ProxySearchMode proxy_search_mode, MeshLoader loader);
+                 ProxySearchMode proxy_search_mode, MeshLoader loader, MeshLoader loaded);
 
   // --- Scene ---
 
-  /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now.
-  void replace_scene(const std::filesystem::path& file);
+  /// Returns where files may be that a client without the right to configure names: the directories of the
+  /// search path, of the configuration and of the configured scene.
+  FileScope client_scope() const;
+  /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now. scope: where the scene
+  /// and its meshes may be.
+  void replace_scene(const std::filesystem::path& file, const FileScope& scope = {});
   /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. Returns the
-  /// name of the obstacle.
-  std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source);
+  /// name of the obstacle. scope: where its mesh may be.
+  std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
+                              const FileScope& scope = {});
   void remove_obstacle(const std::string& name);
   /// Moves a mesh obstacle to a pose of its mesh frame O in the world, on a straight path at constant speed.
   /// The motion starts kMoveDelay_s from now and takes duration_s.
@@ -89,9 +95,10 @@ class Reconfigurator {
   /// The scene that was offered to the loop last. Returns at once, even while a change is being built.
   struct PresentScene {
     SceneSettings settings;
-    std::string text;                         ///< scene file with this content
-    std::vector<std::string> obstacle_names;  ///< indexed by obstacle number
-    std::uint32_t rendering_id;               ///< rendering that contains the scene
+    std::string text;                          ///< scene file with this content
+    std::vector<std::string> obstacle_names;   ///< indexed by obstacle number
+    std::uint32_t rendering_id;                ///< rendering that contains the scene
+    std::shared_ptr<const MeshLoader> meshes;  ///< the mesh files as they were read
   };
   std::shared_ptr<const PresentScene> present_scene() const;
   /// What detects the contacts of the rendering that was offered last.
@@ -130,6 +137,7 @@ class Reconfigurator {
   struct BuiltScene {
     std::shared_ptr<const Scene> scene;
     std::vector<std::string> mesh_warnings;
+    std::shared_ptr<const MeshLoader> meshes;  ///< has read the files of the scene
   };
   /// Settings after a reload, and the keys that the files have changed.
   struct ReloadedSettings {
@@ -151,15 +159,15 @@ class Reconfigurator {
 
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
-  BuiltScene build_scene(const SceneSettings& scene) const;
-  BuiltScene build_starting_scene(SceneSettings& scene);
+  static BuiltScene build_scene(const SceneSettings& scene, MeshLoader meshes, const FileScope& scope);
+  BuiltScene build_starting_scene(SceneSettings& scene, const FileScope& scope);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
   void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
-             std::string text, std::shared_ptr<const Scene> built);
+             std::string text, BuiltScene built);
   void set_workspace(const WorkspaceRequest& request);
   LocalModelSet other_models(std::uint32_t id);
   ReloadedSettings reload_settings(const Settings& file) const;
-  bool is_profile_changed(const DeviceSettings& device) const;
+  bool is_profile_changed(const RunConfig& config) const;
   ReloadedScene reload_scene(const SceneSettings& scene);
 
   mutable std::mutex mutex_;       ///< protects all members but contacts_ and present_
@@ -171,6 +179,7 @@ class Reconfigurator {
   ServoLoop& loop_;
   ProxySearchMode proxy_search_mode_;
   MeshLoader loader_;
+  std::shared_ptr<const MeshLoader> loaded_;  ///< has read the files of scene_
   std::uint32_t rendering_id_ = 0;
   std::uint64_t checksum_ = 0;
   WorkspaceRequest workspace_;

@@ -6,6 +6,8 @@
 #include <memory>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 #include "collision/meshes/mesh_file.hpp"
 #include "config/config_error.hpp"
 #include "config/search_path.hpp"
@@ -29,20 +31,47 @@ Json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// Calls the function, and turns the errors of the reconfigurator into RpcError.
+/// Returns true if the caller may name files outside of the directories for clients, and read in errors what
+/// files contain.
+bool may_read_files(const Caller& caller) {
+  return caller.role >= Role::administrator;
+}
+
+FileScope scope_of(const Caller& caller, const Reconfigurator& reconfigurator) {
+  return may_read_files(caller) ? FileScope() : reconfigurator.client_scope();
+}
+
+/// Calls the function, and turns the errors of the reconfigurator into RpcError. source: name of the request
+/// in errors about its parameters. Errors about files quote them only to callers who may configure.
 template <class Call>
-MethodResult with_rpc_errors(const Call& call) {
+MethodResult with_rpc_errors(const Caller& caller, const char* source, const Call& call) {
   try {
     return call();
   } catch (const BusyError& error) {
     throw RpcError(RpcCode::invalid_state, error.what());
   } catch (const ConfigError& error) {
-    throw RpcError(RpcCode::rejected, error.what());
+    throw RpcError(RpcCode::rejected, may_read_files(caller) ? error.what() : error.public_text(source));
   } catch (const MeshError& error) {
-    throw RpcError(RpcCode::rejected, error.what());
+    throw RpcError(RpcCode::rejected, may_read_files(caller) ? error.what() : error.public_text());
   } catch (const std::invalid_argument& error) {
     throw RpcError(RpcCode::rejected, error.what());
   }
+}
+
+/// Returns the scene file of this name: of the candidates along the search path the first in the scope.
+std::filesystem::path scene_file(const std::string& name, const FileScope& scope) {
+  const SearchPath search;
+  if (!scope.restricted()) return search.require(name);
+  std::vector<std::filesystem::path> places = search.candidates(name);
+  std::erase_if(places, [&scope](const std::filesystem::path& place) { return !scope.contains(place); });
+  std::error_code ignored;
+  for (const std::filesystem::path& place : places)
+    if (std::filesystem::exists(std::filesystem::symlink_status(place, ignored))) return place;
+  if (!places.empty()) throw ConfigError(name, {}, search.not_found(name));
+  throw ConfigError(
+      name, {},
+      "lies outside of the directories from which clients may load files (" + scope.directories_text() +
+          "); store the scene there, or let an administrator name it in wrenchd.toml and reload");
 }
 
 Json current_rendering(const Reconfigurator& reconfigurator) {
@@ -142,14 +171,21 @@ Json workspace_json(const Reconfigurator& reconfigurator) {
   return {{"scale", request.scale}, {"clutched", request.clutched}};
 }
 
+/// Returns the message of an error without the content of files.
+std::string public_text(const std::exception& error) {
+  if (const auto* config = dynamic_cast<const ConfigError*>(&error)) return config->public_text({});
+  if (const auto* mesh = dynamic_cast<const MeshError*>(&error)) return mesh->public_text();
+  return error.what();
+}
+
 std::string listed(const std::vector<std::string>& keys) {
   std::string text;
   for (const std::string& key : keys) text += (text.empty() ? "" : ", ") + key;
   return text.empty() ? "nothing" : text;
 }
 
-MethodResult reload_result(const std::function<ReloadResult()>& reload_all) {
-  return with_rpc_errors([&] {
+MethodResult reload_result(const Caller& caller, const std::function<ReloadResult()>& reload_all) {
+  return with_rpc_errors(caller, "reload", [&] {
     const ReloadResult result = reload_all();
     return MethodResult(Json{{"applied", result.applied},
                              {"not_applied", result.not_applied},
@@ -196,8 +232,11 @@ ReloadResult reload_config(Reconfigurator& reconfigurator, EventFeed& feed,
             {{"applied", result.applied}, {"not_applied", result.not_applied}, {"error", nullptr}});
   return result;
 } catch (const std::exception& error) {
-  feed.emit("reload", EventLevel::error, std::string("reload: rejected, nothing changes: ") + error.what(),
-            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"error", error.what()}});
+  // Every observer receives the event, so it quotes no file; the log does.
+  const std::string text = public_text(error);
+  feed.emit("reload", EventLevel::error, "reload: rejected, nothing changes: " + text,
+            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"error", text}});
+  if (text != error.what()) spdlog::error("reload: rejected, because: {}", error.what());
   throw;
 }
 
@@ -233,9 +272,10 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
       "Replaces the scene, tool included. The force crosses over without a step when the proxy has a "
       "feasible "
       "pose in the new scene.",
-      [&reconfigurator](const Json& params, const Caller&) {
-        return with_rpc_errors([&] {
-          reconfigurator.replace_scene(SearchPath().require(params["file"].get<std::string>()));
+      [&reconfigurator](const Json& params, const Caller& caller) {
+        return with_rpc_errors(caller, "scene.load", [&] {
+          const FileScope scope = scope_of(caller, reconfigurator);
+          reconfigurator.replace_scene(scene_file(params["file"].get<std::string>(), scope), scope);
           return MethodResult(current_rendering(reconfigurator));
         });
       },
@@ -244,10 +284,10 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
                       Role::operator_,
                       {{"obstacle", ParamType::object, true, "the keys of an [[obstacle]] of a scene file"}},
                       "Adds an obstacle. Returns its name, which scene.move and scene.remove use.",
-                      [&reconfigurator](const Json& params, const Caller&) {
-                        return with_rpc_errors([&] {
-                          const std::string name =
-                              reconfigurator.insert_obstacle(toml_of(params["obstacle"]), "scene.add");
+                      [&reconfigurator](const Json& params, const Caller& caller) {
+                        return with_rpc_errors(caller, "scene.add", [&] {
+                          const std::string name = reconfigurator.insert_obstacle(
+                              toml_of(params["obstacle"]), "scene.add", scope_of(caller, reconfigurator));
                           Json result = current_rendering(reconfigurator);
                           result["name"] = name;
                           return MethodResult(result);
@@ -258,8 +298,8 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
                       Role::operator_,
                       {{"name", ParamType::text, true, "name of the obstacle"}},
                       "Removes an obstacle; its contact force fades out.",
-                      [&reconfigurator](const Json& params, const Caller&) {
-                        return with_rpc_errors([&] {
+                      [&reconfigurator](const Json& params, const Caller& caller) {
+                        return with_rpc_errors(caller, "scene.remove", [&] {
                           reconfigurator.remove_obstacle(params["name"].get<std::string>());
                           return MethodResult(current_rendering(reconfigurator));
                         });
@@ -273,8 +313,8 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
        {"rotation_vector_rad", ParamType::vector, false, "target rotation in the world; default: none"},
        {"duration_s", ParamType::number, true, "duration of the motion, which has constant speed"}},
       "Moves an obstacle to a pose. The motion starts 0.2 s from now and pushes the proxy.",
-      [&reconfigurator](const Json& params, const Caller&) {
-        return with_rpc_errors([&] {
+      [&reconfigurator](const Json& params, const Caller& caller) {
+        return with_rpc_errors(caller, "scene.move", [&] {
           const Pose X_WO = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
                              vector_of(params, "position_m", Vector3d::Zero())};
           reconfigurator.move_obstacle(params["name"].get<std::string>(), X_WO,
@@ -292,8 +332,8 @@ void add_rendering_methods(MethodTable& table, Reconfigurator& reconfigurator) {
       {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, contacts, ..."},
        {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
       "Changes the contact method and the wrench law. Other keys keep their values.",
-      [&reconfigurator](const Json& params, const Caller&) {
-        return with_rpc_errors([&] {
+      [&reconfigurator](const Json& params, const Caller& caller) {
+        return with_rpc_errors(caller, "rendering.set", [&] {
           reconfigurator.set_rendering(toml_of(params), "rendering.set");
           return MethodResult(current_rendering(reconfigurator));
         });
@@ -311,8 +351,8 @@ void add_workspace_methods(MethodTable& table, Reconfigurator& reconfigurator) {
                   "true: the tool stays in place without contact force while the handle moves"},
                  {"recentre", ParamType::boolean, false, "true: the tool moves to the pose of the handle"}},
                 "Changes how the handle moves the tool, without a step. Returns the new values.",
-                [&reconfigurator](const Json& params, const Caller&) {
-                  return with_rpc_errors([&] {
+                [&reconfigurator](const Json& params, const Caller& caller) {
+                  return with_rpc_errors(caller, "workspace.set", [&] {
                     if (params.contains("scale")) reconfigurator.set_scale(params["scale"].get<double>());
                     if (params.contains("clutched"))
                       reconfigurator.set_clutched(params["clutched"].get<bool>());
@@ -340,8 +380,8 @@ void add_model_methods(MethodTable& table, Reconfigurator& reconfigurator) {
        {"damping_Nm_s_per_rad", ParamType::number, false, "spring or damping"}},
       "Sets a local model of the surroundings of the handle, which the loop renders at its own rate. "
       "Send the model again before its lifetime ends.",
-      [&reconfigurator](const Json& params, const Caller&) {
-        return with_rpc_errors([&] {
+      [&reconfigurator](const Json& params, const Caller& caller) {
+        return with_rpc_errors(caller, "model.set", [&] {
           reconfigurator.set_model(model_of(params), params["lifetime_s"].get<double>());
           return MethodResult(Json::object());
         });
@@ -365,7 +405,9 @@ void add_reload_method(MethodTable& table, std::function<ReloadResult()> reload_
       {},
       "Reads the configuration again, and applies all of it, or nothing if it has an error. Returns the keys "
       "that were applied, and the keys that were not, with the reason.",
-      [reload_all = std::move(reload_all)](const Json&, const Caller&) { return reload_result(reload_all); },
+      [reload_all = std::move(reload_all)](const Json&, const Caller& caller) {
+        return reload_result(caller, reload_all);
+      },
       true});
 }
 

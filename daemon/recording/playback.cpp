@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording/playback.hpp"
 
-#include <array>
-#include <fstream>
+#include <sstream>
 #include <string>
 #include <string_view>
 
 #include "config/config_error.hpp"
 #include "config/pose_table.hpp"
 #include "config/toml_file.hpp"
-#include "daemon/recording/recording_file.hpp"
+#include "core/files/opened_file.hpp"
+#include "daemon/recording/recording_reader.hpp"
 
 namespace wrenchd {
 namespace {
@@ -18,8 +18,11 @@ bool is_good(const TickRecord& tick) {
   return tick.fresh != 0 && tick.sample_fault == Fault::none && tick.released == 0;
 }
 
-std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
-  const Recording recording = read_recording(file);
+/// A day of poses at 1 kHz occupies about 10 GB, and such a table is a recording.
+constexpr std::uint64_t kMaxTableBytes = std::uint64_t{1} << 30;
+
+std::vector<TimedPose> of_recording(const OpenedFile& opened, const std::filesystem::path& file) {
+  const Recording recording = read_recording(opened, file);
   bool device_time_rises = true;
   double last_s = 0.0;
   bool first = true;
@@ -51,17 +54,16 @@ std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
 
 std::vector<TimedPose> read_playback(const std::filesystem::path& file) {
   constexpr std::string_view kHdf5 = "\x89HDF";
-  std::error_code error;
-  std::ifstream in(file, std::ios::binary);
-  if (!in || !std::filesystem::is_regular_file(file, error))
+  try {
+    OpenedFile opened(file);
+    if (opened.peek(kHdf5.size()) == kHdf5) return of_recording(opened, file);
+    std::istringstream table(opened.read(kMaxTableBytes));
+    return read_timed_poses(table, file.string());
+  } catch (const FileError& error) {
     throw PoseTableError(file.string() +
-                         ": cannot be read; name a recording, or a CSV file of poses with times");
-  std::array<char, 4> begin{};
-  in.read(begin.data(), begin.size());
-  if (in.gcount() == 4 && std::string_view(begin.data(), 4) == kHdf5) return of_recording(file);
-  in.clear();
-  in.seekg(0);
-  return read_timed_poses(in, file.string());
+                         ": cannot be read; name a recording, or a CSV file of poses with times (" +
+                         error.what() + ")");
+  }
 }
 
 }  // namespace wrenchd

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording/recorded_inputs.hpp"
 
-#include <array>
 #include <chrono>
 #include <fstream>
-#include <iterator>
-#include <optional>
-#include <sstream>
 
-#include <openssl/evp.h>
 #include <sys/utsname.h>
 
-#include "config/inherited_toml.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "core/files/opened_file.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
 
@@ -22,42 +17,6 @@ namespace wrenchd {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Returns the bytes of a file; nothing if it cannot be read.
-std::optional<std::string> contents(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return {};
-  std::ifstream in(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(in), {}};
-  if (in.bad()) return {};
-  return bytes;
-}
-
-std::string sha256(const std::string& bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
-  unsigned length = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), hash.data(), &length, EVP_sha256(), nullptr) != 1)
-    throw RecordingError("OpenSSL has no SHA-256");
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string text;
-  for (unsigned i = 0; i < length; ++i) {
-    text += kDigits[hash[i] >> 4];
-    text += kDigits[hash[i] & 15];
-  }
-  return text;
-}
-
-/// Returns the profiles that a profile inherits, the nearest first.
-std::vector<fs::path> parents_of(const fs::path& profile) {
-  std::vector<fs::path> chain;
-  try {
-    read_inherited(profile, SearchPath(), &chain);
-  } catch (const ConfigError&) {  // the file has changed since the start; a replay reports the missing parent
-    return {};
-  }
-  chain.erase(chain.begin());
-  return chain;
-}
 
 const char* word(Realtime realtime) {
   switch (realtime) {
@@ -97,10 +56,10 @@ fs::path mesh_at(const RecordingHeader& header, const std::string& role, const f
     write(file, mesh->bytes);
     return file;
   }
-  const auto bytes = contents(mesh->path);
-  if (!bytes || sha256(*bytes) != mesh->sha256)
+  const auto bytes = read_file_if_readable(mesh->path);
+  if (!bytes || sha256_text(*bytes) != mesh->sha256)
     throw RecordingError(mesh->path.string() + ": " +
-                         (bytes ? "has changed since it was recorded" : "does not exist any more") +
+                         (bytes ? "has changed since it was recorded" : "cannot be read any more") +
                          " (SHA-256 " + mesh->sha256 +
                          "), and the recording does not contain it; restore the file");
   return mesh->path;
@@ -195,35 +154,33 @@ RecordingHeader read_recorded_texts(const RunConfig& config) {
   header.settings_file = config.settings.file;
   header.scene_file = config.scene.file;
   header.profile_file = config.settings.device.profile_file;
-  header.settings = contents(header.settings_file).value_or("");
-  header.scene = contents(header.scene_file).value_or("");
-  header.profile = contents(header.profile_file).value_or("");
+  header.settings = config.settings.text;
+  header.scene = config.scene.text;
   int number = 0;
-  for (const fs::path& parent : parents_of(header.profile_file))
-    header.files.push_back(
-        {"profile_" + std::to_string(++number), parent, {}, true, contents(parent).value_or("")});
-  const fs::path& script = config.settings.simulation.hand_script;
-  header.files.push_back({"hand_script", script, {}, true, contents(script).value_or("")});
+  for (const ConfigText& one : config.profile_texts) {
+    if (number == 0)
+      header.profile = one.text;
+    else
+      header.files.push_back({"profile_" + std::to_string(number), one.file, {}, true, one.text});
+    ++number;
+  }
+  header.files.push_back(
+      {"hand_script", config.settings.simulation.hand_script, {}, true, config.settings.hand_script_text});
   header.realtime = word(config.settings.servo.realtime);
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
   return header;
 }
 
-void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
-  std::size_t inside = 0;
-  const auto add = [&](const std::string& role, const fs::path& at) {
-    std::string bytes = contents(at).value_or("");
-    RecordedFile mesh{role, fs::absolute(at).lexically_normal(), sha256(bytes), true, {}};
-    mesh.embedded = inside + bytes.size() <= kMaxEmbeddedMesh_bytes;
-    if (mesh.embedded) {
-      inside += bytes.size();
-      mesh.bytes = std::move(bytes);
-    }
-    header.files.push_back(std::move(mesh));
-  };
+void add_meshes(const SceneSettings& scene, const MeshLoader& loaded, RecordingHeader& header) {
   const auto add_all = [&](const std::string& role, const std::vector<fs::path>& files) {
-    for (std::size_t i = 0; i < files.size(); ++i) add(part_role(role, i), files[i]);
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const MeshInput* const input = loaded.input(files[i]);
+      if (input == nullptr) continue;  // polygons of a program
+      RecordedFile mesh{part_role(role, i), input->file, input->sha256, input->bytes != nullptr, {}};
+      if (input->bytes) mesh.bytes = *input->bytes;
+      header.files.push_back(std::move(mesh));
+    }
   };
   add_all("tool", mesh_files(scene.tool));
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "collision/meshes/mesh_loader.hpp"
 #include "core/clock.hpp"
 #include "core/scene_settings.hpp"
 #include "daemon/recording/recording_file.hpp"
@@ -13,17 +14,14 @@ namespace wrenchd {
 // The input files of a run, which a recording contains beside its ticks. With them it can be shown and
 // replayed after the files have changed, and on another machine. Not RT-safe: reads and writes files.
 
-/// Total size of the meshes that a recording contains, the tool first. A recording names the remaining meshes
-/// with their SHA-256 only, so that a short recording stays small.
-inline constexpr std::size_t kMaxEmbeddedMesh_bytes = std::size_t{32} << 20;
-
 /// Returns a header with the versions and the texts of settings, scene, profile with its parents, and hand
-/// script. The text of a file that cannot be read is empty.
+/// script, as they were read at the start. A text that does not come from a file is empty.
 RecordingHeader read_recorded_texts(const RunConfig& config);
 
-/// Adds the present mesh files of the scene. Generated meshes need no file: the text of the scene defines
-/// them.
-void add_meshes(const SceneSettings& scene, RecordingHeader& header);
+/// Adds the mesh files of the scene as `loaded` has read them: present files may have other contents. Files
+/// whose bytes the loader has not kept (MeshLoader::kMaxKeptBytes) are named with their SHA-256 only, so that
+/// a short recording stays small. Generated meshes need no file: the text of the scene defines them.
+void add_meshes(const SceneSettings& scene, const MeshLoader& loaded, RecordingHeader& header);
 
 /// Sets the start time to now, by `clock` and by UTC.
 void set_start_time(const Clock& clock, RecordingHeader& header);

@@ -3,20 +3,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <csignal>
 #include <cstddef>
+#include <cstring>
 #include <ctime>
-#include <type_traits>
+#include <utility>
 
-#include <fcntl.h>
 #include <hdf5.h>
-#include <sys/file.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include "daemon/control/owned_fd.hpp"
+#include "daemon/recording/recording_reader.hpp"
+#include "daemon/recording/recording_rows.hpp"
 #include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
@@ -28,17 +23,14 @@ constexpr hsize_t kChunkContacts = 1024;
 constexpr unsigned kDeflateLevel = 1;
 /// Largest expansion of DEFLATE. A table that claims more rows than its file can hold is damaged.
 constexpr std::uint64_t kMaxExpansion = 1032;
-/// Maximum size of a text or a mesh.
-constexpr hsize_t kMaxBytes = hsize_t{1} << 31;
-
-/// A row of /ticks.
-struct TickRow {
-  TickRecord tick;
-  std::uint64_t first_contact = 0;
-  std::uint32_t contact_count = 0;
-  std::uint32_t padding = 0;
-};
-static_assert(std::is_trivially_copyable_v<TickRow> && std::is_trivially_copyable_v<Touch>);
+/// Maximum size of a mesh. The writer stores at most 32 MiB.
+constexpr std::uint64_t kMaxMeshBytes = std::uint64_t{1} << 28;
+/// Maximum size of a text. Configuration files have at most 1 MiB.
+constexpr std::size_t kMaxTextBytes = std::size_t{64} << 20;
+constexpr hsize_t kMaxChunkBytes = hsize_t{64} << 20;
+constexpr std::size_t kMaxNames = 10'000;
+/// Rows that are read and sent together.
+constexpr hsize_t kPieceRows = 4 * RecordingWriter::kChunkTicks;
 
 constexpr std::array kContactRangeFields = {
     RecordField{"first_contact", FieldType::u64, 1, offsetof(TickRow, first_contact), "1", "",
@@ -390,15 +382,22 @@ void RecordingWriter::flush() {
 }
 
 // ------------------------------------------------------------------------------------------------ Reading
+//
+// This part runs in the child process of read_recording(). It asks libhdf5 about each object before it reads
+// the object, and rejects what RecordingWriter never writes.
 
 namespace {
+
+[[noreturn]] void reject(const std::string& reason) {
+  throw RecordingError(reason);
+}
 
 /// Returns the text of an attribute or data set; returns an empty text if there is none.
 template <class Read>
 std::string text_of(const Handle& type, const Read& read) {
   if (!type.ok() || H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) return {};
   const std::size_t size = H5Tget_size(type);
-  if (size > kMaxBytes) return {};
+  if (size > kMaxTextBytes) reject("has a text of more than 64 MiB; the file is damaged");
   std::string text(size, '\0');
   if (read(text.data()) < 0) return {};
   text.resize(std::min(text.size(), text.find('\0')));  // an empty text is stored as one zero byte
@@ -415,7 +414,7 @@ std::string read_text(hid_t object, const char* name) {
     return text_of(type, [&](char* to) { return H5Aread(attribute, type, to); });
   char* bytes = nullptr;
   if (H5Aread(attribute, type, &bytes) < 0 || bytes == nullptr) return {};
-  const std::string text = bytes;
+  const std::string text(bytes, ::strnlen(bytes, kMaxTextBytes));
   H5Dvlen_reclaim(type, space, H5P_DEFAULT, &bytes);
   return text;
 }
@@ -425,9 +424,71 @@ T read_number(hid_t object, const char* name, hid_t type, T otherwise) {
   const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
   if (!attribute.ok()) return otherwise;
   const Handle space(H5Aget_space(attribute), H5Sclose);
+  const Handle stored(H5Aget_type(attribute), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(stored);
   T number = otherwise;
-  if (H5Sget_simple_extent_npoints(space) != 1 || H5Aread(attribute, type, &number) < 0) return otherwise;
+  if (H5Sget_simple_extent_npoints(space) != 1 || (kind != H5T_INTEGER && kind != H5T_FLOAT) ||
+      H5Aread(attribute, type, &number) < 0)
+    return otherwise;
   return number;
+}
+
+/// Rejects a name that does not stand for an object of this file: a soft link may form a loop, and an
+/// external link opens another file. Returns false if the name does not exist.
+bool is_object(hid_t group, const std::string& name) {
+  if (H5Lexists(group, name.c_str(), H5P_DEFAULT) <= 0) return false;
+  H5L_info_t link{};
+  if (H5Lget_info(group, name.c_str(), &link, H5P_DEFAULT) < 0)
+    reject("'" + name + "' cannot be read; the file is damaged");
+  if (link.type != H5L_TYPE_HARD)
+    reject("'" + name + "' is a " + (link.type == H5L_TYPE_SOFT ? "symbolic link" : "link to another file") +
+           ", and a recording has none; use a complete copy, as it was recorded");
+  return true;
+}
+
+/// Rejects a data set whose bytes are not all in this file, or need a plug-in of libhdf5.
+void check_storage(hid_t set, const std::string& name) {
+  const Handle plan(H5Dget_create_plist(set), H5Pclose);
+  if (!plan.ok()) reject("'" + name + "' cannot be read; the file is damaged");
+  const std::string own =
+      ", and a recording contains all of its data itself; use a complete copy, as it was recorded";
+  const H5D_layout_t layout = H5Pget_layout(plan);
+  if (H5Pget_external_count(plan) != 0)
+    reject("'" + name + "' takes its data from another file (external storage)" + own);
+  if (layout != H5D_CHUNKED && layout != H5D_CONTIGUOUS && layout != H5D_COMPACT)
+    reject("'" + name + "' takes its data from other data sets (virtual storage)" + own);
+  const int filters = H5Pget_nfilters(plan);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0, config = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(plan, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, &config);
+    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_FLETCHER32)
+      reject("'" + name + "' is compressed in a way that no recording is; the file is damaged");
+  }
+  if (layout != H5D_CHUNKED) return;
+  std::array<hsize_t, 1> chunk{};
+  const Handle type(H5Dget_type(set), H5Tclose);
+  if (H5Pget_chunk(plan, static_cast<int>(chunk.size()), chunk.data()) != 1 ||
+      chunk[0] > kMaxChunkBytes / std::max<std::size_t>(1, H5Tget_size(type)))
+    reject("'" + name + "' has blocks of more than 64 MiB; the file is damaged");
+}
+
+/// Opens a data set of a group. Returns no handle if there is none of this name.
+hid_t open_set(hid_t group, const std::string& name) {
+  if (!is_object(group, name)) return H5I_INVALID_HID;
+  const hid_t object = H5Oopen(group, name.c_str(), H5P_DEFAULT);
+  if (object < 0 || H5Iget_type(object) != H5I_DATASET) {
+    if (object >= 0) H5Oclose(object);
+    reject("'" + name + "' is no table and no text; the file is damaged");
+  }
+  try {
+    check_storage(object, name);
+  } catch (...) {
+    H5Oclose(object);
+    throw;
+  }
+  return object;
 }
 
 std::string read_config(hid_t set, std::filesystem::path& path) {
@@ -438,55 +499,51 @@ std::string read_config(hid_t set, std::filesystem::path& path) {
   return text_of(type, [&](char* to) { return H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to); });
 }
 
-/// An open recording, and how to report an error in it.
-struct OpenFile {
-  const std::filesystem::path& path;
-  hid_t file;
-  std::uint64_t bytes;  ///< Size of the file.
-
-  [[noreturn]] void reject(const std::string& reason) const {
-    throw RecordingError(path.string() + ": " + reason);
-  }
-};
-
 std::vector<std::string> names_in(hid_t group) {
   std::vector<std::string> names;
   H5Literate(
       group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr,
       [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
-        static_cast<std::vector<std::string>*>(list)->emplace_back(name);
+        auto& all = *static_cast<std::vector<std::string>*>(list);
+        if (all.size() >= kMaxNames) return -1;
+        all.emplace_back(name);
         return 0;
       },
       &names);
+  if (names.size() >= kMaxNames) reject("has more than 10000 files; the file is damaged");
   return names;
 }
 
-RecordedFile read_mesh(const OpenFile& open_file, hid_t set, const std::string& role) {
+RecordedFile read_mesh(hid_t set, const std::string& role, std::uint64_t file_bytes) {
   RecordedFile mesh{role,
                     read_text(set, "file"),
                     read_text(set, "sha256"),
                     read_number<std::uint8_t>(set, "embedded", H5T_NATIVE_UINT8, 0) != 0,
                     {}};
   const Handle space(H5Dget_space(set), H5Sclose);
+  const Handle type(H5Dget_type(set), H5Tclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space);
   if (!mesh.embedded || count <= 0) return mesh;
-  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMaxBytes, open_file.bytes * kMaxExpansion))
-    open_file.reject("the mesh '" + role + "' claims more bytes than the file can hold; the file is damaged");
+  if (H5Tget_class(type) != H5T_INTEGER || H5Tget_size(type) != 1)
+    reject("the mesh '" + role + "' does not consist of bytes; the file is damaged");
+  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMaxMeshBytes, file_bytes * kMaxExpansion))
+    reject("the mesh '" + role + "' claims more bytes than the file can hold; the file is damaged");
   mesh.bytes.resize(static_cast<std::size_t>(count));
   if (H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data()) < 0)
-    open_file.reject("the mesh '" + role + "' cannot be read; the file is damaged");
+    reject("the mesh '" + role + "' cannot be read; the file is damaged");
   return mesh;
 }
 
-void read_files(const OpenFile& open_file, RecordingHeader& header) {
-  for (const char* group_path : {"/config", "/meshes"}) {
-    const Handle group(H5Gopen2(open_file.file, group_path, H5P_DEFAULT), H5Gclose);
+void read_files(hid_t file, std::uint64_t file_bytes, RecordingHeader& header) {
+  for (const char* group_name : {"config", "meshes"}) {
+    if (!is_object(file, group_name)) continue;
+    const Handle group(H5Gopen2(file, group_name, H5P_DEFAULT), H5Gclose);
     if (!group.ok()) continue;
     for (const std::string& name : names_in(group)) {
-      const Handle set(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose);
+      const Handle set(open_set(group, name), H5Dclose);
       if (!set.ok()) continue;
       if (is_mesh(name)) {
-        header.files.push_back(read_mesh(open_file, set, name));
+        header.files.push_back(read_mesh(set, name, file_bytes));
         continue;
       }
       std::filesystem::path path;
@@ -503,166 +560,110 @@ void read_files(const OpenFile& open_file, RecordingHeader& header) {
   }
 }
 
-RecordingHeader read_header(const OpenFile& open_file) {
+RecordingHeader read_header(hid_t file, std::uint64_t file_bytes) {
   RecordingHeader header;
-  header.version = read_text(open_file.file, "wrenchd_version");
-  header.kernel = read_text(open_file.file, "kernel");
-  header.realtime = read_text(open_file.file, "realtime");
-  header.virtual_time = read_text(open_file.file, "clock") == "virtual";
-  header.rate_Hz = read_number(open_file.file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
-  header.started_ns = read_number<std::int64_t>(open_file.file, "started_ns", H5T_NATIVE_INT64, 0);
-  header.started_unix_ns = read_number<std::int64_t>(open_file.file, "started_unix_ns", H5T_NATIVE_INT64, 0);
-  read_files(open_file, header);
+  header.version = read_text(file, "wrenchd_version");
+  header.kernel = read_text(file, "kernel");
+  header.realtime = read_text(file, "realtime");
+  header.virtual_time = read_text(file, "clock") == "virtual";
+  header.rate_Hz = read_number(file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
+  header.started_ns = read_number<std::int64_t>(file, "started_ns", H5T_NATIVE_INT64, 0);
+  header.started_unix_ns = read_number<std::int64_t>(file, "started_unix_ns", H5T_NATIVE_INT64, 0);
+  read_files(file, file_bytes, header);
   return header;
 }
 
 /// Rejects a file of another format before anything is read, because its columns differ in name or meaning.
-void check_format(const OpenFile& open_file) {
-  std::string format = read_text(open_file.file, "format");
-  std::string version = read_text(open_file.file, "wrenchd_version");
+void check_format(hid_t file) {
+  std::string format = read_text(file, "format");
+  std::string version = read_text(file, "wrenchd_version");
   if (format.empty()) {  // formats up to 5 have these attributes at the table
-    const Handle table(H5Dopen2(open_file.file, "/ticks", H5P_DEFAULT), H5Dclose);
-    if (!table.ok()) open_file.reject("has no table 'ticks'; name a recording of wrenchd");
+    const Handle table(open_set(file, "ticks"), H5Dclose);
+    if (!table.ok()) reject("has no table 'ticks'; name a recording of wrenchd");
     format = read_text(table, "format");
     version = read_text(table, "wrenchd_version");
     if (format.empty()) format = "1";
   }
   if (format != kFormat)
-    open_file.reject("was written by wrenchd " + (version.empty() ? "of an unknown version" : version) +
-                     " in recording format " + format + ", and this wrenchd reads format " + kFormat +
-                     "; replay or export it with the version that wrote it");
+    reject("was written by wrenchd " + (version.empty() ? "of an unknown version" : version) +
+           " in recording format " + format + ", and this wrenchd reads format " + kFormat +
+           "; replay or export it with the version that wrote it");
 }
 
-/// Rejects a table that lacks a column.
-void check_columns(const OpenFile& open_file, const TableKind& table, hid_t set) {
+bool is_number(H5T_class_t kind) {
+  return kind == H5T_INTEGER || kind == H5T_FLOAT;
+}
+
+/// Rejects a table that lacks a column, or has a column of another type.
+void check_columns(const TableKind& table, hid_t set) {
   const Handle type(H5Dget_type(set), H5Tclose);
   if (H5Tget_class(type) != H5T_COMPOUND)
-    open_file.reject("table '" + std::string(table.name) + "' has no columns; name a recording of wrenchd");
-  for (const RecordField& field : table.fields)
-    if (H5Tget_member_index(type, field.name) < 0)
-      open_file.reject("column '" + std::string(field.name) + "' of table '" + table.name +
-                       "' is missing; the file was changed, take it as it was recorded");
+    reject("table '" + std::string(table.name) + "' has no columns; name a recording of wrenchd");
+  if (H5Tget_size(type) > 4 * table.row_bytes)
+    reject("table '" + std::string(table.name) + "' has longer rows than a recording; the file is damaged");
+  for (const RecordField& field : table.fields) {
+    const int index = H5Tget_member_index(type, field.name);
+    const std::string column = "column '" + std::string(field.name) + "' of table '" + table.name + "' ";
+    if (index < 0) reject(column + "is missing; the file was changed, take it as it was recorded");
+    const Handle member(H5Tget_member_type(type, static_cast<unsigned>(index)), H5Tclose);
+    const H5T_class_t kind = H5Tget_class(member);
+    bool good = field.count == 1 && is_number(kind) && H5Tget_size(member) == size_of(field.type);
+    if (field.count > 1 && kind == H5T_ARRAY) {
+      std::array<hsize_t, 1> count{};
+      const Handle element(H5Tget_super(member), H5Tclose);
+      good = H5Tget_array_ndims(member) == 1 && H5Tget_array_dims2(member, count.data()) == 1 &&
+             count[0] == field.count && is_number(H5Tget_class(element)) &&
+             H5Tget_size(element) == size_of(field.type);
+    }
+    if (!good)
+      reject(column +
+             "has another type than in a recording; the file was changed, take it as it was recorded");
+  }
 }
 
+/// Sends the rows of a table in pieces, so that the address space need not hold it.
 template <class Row>
-std::vector<Row> read_table(const OpenFile& open_file, const TableKind& table) {
-  const Handle set(H5Dopen2(open_file.file, table.path, H5P_DEFAULT), H5Dclose);
-  if (!set.ok())
-    open_file.reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
-  check_columns(open_file, table, set);
+void send_table(hid_t file, std::uint64_t file_bytes, const TableKind& table, RecordingSender& sender) {
+  const Handle set(open_set(file, table.path + 1), H5Dclose);
+  if (!set.ok()) reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
+  check_columns(table, set);
   const Handle space(H5Dget_space(set), H5Sclose);
   hsize_t rows = 0;
   if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &rows, nullptr) != 1)
-    open_file.reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
-  if (rows > open_file.bytes * kMaxExpansion / table.row_bytes + 1)
-    open_file.reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
-                     " rows that its header states; the file is damaged");
-  std::vector<Row> read(rows);
+    reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
+  if (rows > file_bytes * kMaxExpansion / table.row_bytes + 1)
+    reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
+           " rows that its header states; the file is damaged");
   const Handle row(row_type(table), H5Tclose);
-  if (rows > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()) < 0)
-    open_file.reject("table '" + std::string(table.name) +
-                     "' cannot be read; the file is damaged or truncated");
-  return read;
-}
-
-/// Returns true for a row that was allocated but not written when the process died. HDF5 reads it as zeros.
-bool is_unwritten(const TickRow& row) {
-  return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
-}
-
-/// Returns true if all contacts of a tick were written. A row that was allocated but not written reads as
-/// zeros; a contact has a normal of unit length.
-bool has_its_contacts(const TickRow& row, const std::vector<Touch>& contacts) {
-  if (row.first_contact > contacts.size() || row.contact_count > contacts.size() - row.first_contact)
-    return false;
-  const auto first = contacts.begin() + static_cast<std::ptrdiff_t>(row.first_contact);
-  return std::none_of(first, first + row.contact_count, [](const Touch& contact) {
-    const auto* const bytes = reinterpret_cast<const unsigned char*>(&contact);
-    return std::all_of(bytes, bytes + sizeof contact, [](unsigned char byte) { return byte == 0; });
-  });
-}
-
-/// Returns true if another process has locked the file. HDF5 locks each file that it writes.
-bool is_locked(const std::filesystem::path& file) {
-  const OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  return fd && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  std::vector<Row> piece(static_cast<std::size_t>(std::min<hsize_t>(rows, kPieceRows)));
+  for (hsize_t start = 0; start < rows; start += kPieceRows) {
+    const hsize_t count = std::min<hsize_t>(kPieceRows, rows - start);
+    const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    H5Sselect_hyperslab(space, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
+    std::fill(piece.begin(), piece.end(), Row{});
+    if (H5Dread(set, row, in_memory, space, H5P_DEFAULT, piece.data()) < 0)
+      reject("table '" + std::string(table.name) + "' cannot be read; the file is damaged or truncated");
+    sender.send(std::span(std::as_const(piece)).first(static_cast<std::size_t>(count)));
+  }
 }
 
 }  // namespace
 
-namespace {
-
-Recording read_in_this_process(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::uint64_t bytes = std::filesystem::file_size(file, error);
-  if (error) throw RecordingError(file.string() + ": does not exist; name a recording of wrenchd");
-  const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  const OpenFile open_file{file, id, bytes};
-  if (!id.ok() && is_locked(file))
-    open_file.reject(
-        "is still being written, or another program has locked it; end the recording with 'wrenchctl record "
-        "stop', or wait for the other program, and try again");
-  if (!id.ok())
-    open_file.reject(H5Fis_hdf5(file.c_str()) > 0 ? "is truncated or damaged; use a complete copy"
-                                                  : "is not an HDF5 file; name a recording of wrenchd");
-  check_format(open_file);
-  Recording recording;
-  recording.header = read_header(open_file);
-  std::vector<TickRow> rows = read_table<TickRow>(open_file, tick_table());
-  recording.contacts = read_table<Touch>(open_file, contact_table());
-  while (rows.size() > 1 && (is_unwritten(rows.back()) || !has_its_contacts(rows.back(), recording.contacts)))
-    rows.pop_back();
-  recording.ticks.reserve(rows.size());
-  recording.contact_ranges.reserve(rows.size());
-  for (const TickRow& row : rows) {
-    const bool valid = has_its_contacts(row, recording.contacts);
-    recording.ticks.push_back(row.tick);
-    recording.contact_ranges.push_back(valid ? ContactRange{row.first_contact, row.contact_count}
-                                             : ContactRange{});
-  }
-  return recording;
-}
-
-/// Processor time after which reading a recording counts as a loop: a fixed part, and a part for each 4 MiB.
-constexpr rlim_t kReading_s = 2;
-constexpr std::uint64_t kBytesPerSecond = std::uint64_t{4} << 20;
-
-/// Returns false if libhdf5 crashes or loops while it reads the file, as it does on some damaged files. A
-/// child process tries it: a crash there harms no other process. The child keeps no signal handler of the
-/// parent.
-bool libhdf5_survives(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::uint64_t bytes = std::filesystem::file_size(file, error);
-  if (error) return true;  // the reader says why
-  const pid_t child = ::fork();
-  if (child < 0)
-    throw RecordingError(file.string() + ": cannot be read: no process can be started; try again");
-  if (child == 0) {
-    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::signal(signal, SIG_DFL);
-    const rlimit no_core = {0, 0},
-                 time = {kReading_s + bytes / kBytesPerSecond, kReading_s + bytes / kBytesPerSecond};
-    ::setrlimit(RLIMIT_CORE, &no_core);
-    ::setrlimit(RLIMIT_CPU, &time);
-    try {
-      read_in_this_process(file);
-    } catch (const std::exception&) {
-      // The parent meets the same error and reports it.
-    }
-    ::_exit(0);
-  }
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
-}  // namespace
-
-Recording read_recording(const std::filesystem::path& file) {
+void send_hdf5(int descriptor, std::uint64_t file_bytes, const std::function<void()>& open_done,
+               RecordingSender& sender) {
   set_up_hdf5();
-  if (!libhdf5_survives(file))
-    throw RecordingError(file.string() + ": is damaged: libhdf5 crashes or loops on it; use a complete copy");
-  return read_in_this_process(file);
+  H5PLset_loading_state(0);  // no plug-ins, whatever the file or the environment names
+  const std::string name = "/proc/self/fd/" + std::to_string(descriptor);
+  const Handle file(H5Fopen(name.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file.ok())
+    reject(H5Fis_hdf5(name.c_str()) > 0 ? "is truncated or damaged; use a complete copy"
+                                        : "is not an HDF5 file; name a recording of wrenchd");
+  open_done();
+  check_format(file);
+  sender.send(read_header(file, file_bytes));
+  send_table<TickRow>(file, file_bytes, tick_table(), sender);
+  send_table<Touch>(file, file_bytes, contact_table(), sender);
+  sender.end();
 }
 
 }  // namespace wrenchd

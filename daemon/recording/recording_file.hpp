@@ -119,8 +119,14 @@ struct Recording {
 };
 
 /// Reads a recording bit for bit. Drops unfinished rows at the end, which a dying process leaves. Throws
-/// RecordingError; a recording of another format is rejected with the version that wrote it. Not RT-safe:
-/// reads a file.
+/// RecordingError; a recording of another format is rejected with the version that wrote it.
+///
+/// libhdf5 crashes, loops or opens other files if a file tells it to. So a child process calls it, with
+/// limits of address space, processor time and system calls, and sends the rows through a pipe. The child
+/// rejects what wrenchd never writes before libhdf5 acts on it: external storage, virtual data sets, links to
+/// other files or names, filters from plugins, other types, and more rows than the file can hold. If the
+/// child crashes or exceeds a limit, the file is rejected as damaged. Not RT-safe: reads a file, starts a
+/// process.
 Recording read_recording(const std::filesystem::path& file);
 
 }  // namespace wrenchd

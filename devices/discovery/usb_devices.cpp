@@ -8,8 +8,6 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <span>
@@ -18,6 +16,8 @@
 
 #include <libudev.h>
 #include <unistd.h>
+
+#include "core/files/opened_file.hpp"
 
 namespace wrenchd {
 namespace {
@@ -98,8 +98,8 @@ void read_descriptor(UsbDevice& device) {
 }
 
 std::vector<std::uint8_t> read_bytes(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  const std::string bytes = read_file_if_readable(file).value_or("");
+  return {bytes.begin(), bytes.end()};
 }
 
 // --- one device -------------------------------------------------------------------------------------------
@@ -109,9 +109,9 @@ void read_usb_properties(UsbDevice& device, udev_device* usb) {
   device.usb_node = text(udev_device_get_devnode(usb));
   device.vendor = static_cast<std::uint16_t>(number(attribute(usb, "idVendor"), 16));
   device.product = static_cast<std::uint16_t>(number(attribute(usb, "idProduct"), 16));
-  device.serial = attribute(usb, "serial");
-  device.manufacturer = attribute(usb, "manufacturer");
-  device.product_name = attribute(usb, "product");
+  device.serial = without_control_characters(attribute(usb, "serial"));
+  device.manufacturer = without_control_characters(attribute(usb, "manufacturer"));
+  device.product_name = without_control_characters(attribute(usb, "product"));
 }
 
 /// The uevent of a HID device that is not on USB contains its ids: HID_ID=0005:00001209:00006D0F.
@@ -123,8 +123,8 @@ void read_hid_properties(UsbDevice& device, udev_device* hid) {
     device.vendor = static_cast<std::uint16_t>(number(std::string_view(id).substr(first + 1, 8), 16));
     device.product = static_cast<std::uint16_t>(number(std::string_view(id).substr(second + 1, 8), 16));
   }
-  device.serial = text(udev_device_get_property_value(hid, "HID_UNIQ"));
-  device.product_name = text(udev_device_get_property_value(hid, "HID_NAME"));
+  device.serial = without_control_characters(text(udev_device_get_property_value(hid, "HID_UNIQ")));
+  device.product_name = without_control_characters(text(udev_device_get_property_value(hid, "HID_NAME")));
 }
 
 UsbDevice from_hidraw(udev_device* hidraw, udev_device* hid) {
@@ -212,6 +212,12 @@ std::vector<UsbDevice> list_usb_devices() {
            std::tuple(numbers_in(b.port_path), b.interface, numbers_in(b.hidraw_node));
   });
   return found;
+}
+
+std::string without_control_characters(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
+  return text;
 }
 
 std::string to_printable(std::string text) {

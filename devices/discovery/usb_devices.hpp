@@ -35,6 +35,10 @@ struct UsbDevice {
 /// Throws std::runtime_error if udev is not available. Not RT-safe: may take milliseconds.
 std::vector<UsbDevice> list_usb_devices();
 
+/// Returns text from a device with its control characters replaced by '?'. A line feed in a serial number
+/// would begin a new line in logs and in what a user copies from them. Not RT-safe: allocates.
+std::string without_control_characters(std::string text);
+
 /// Returns text from a device with all control characters replaced, safe for terminals and logs. Not RT-safe:
 /// allocates.
 std::string to_printable(std::string text);

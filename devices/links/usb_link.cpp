@@ -224,7 +224,7 @@ void UsbLink::TransferThread::check_identity(const UsbDevice& device) const {
     std::array<unsigned char, 256> text{};
     const int n = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(),
                                                      static_cast<int>(text.size()));
-    found.serial.assign(text.begin(), text.begin() + std::max(n, 0));
+    found.serial = without_control_characters({text.begin(), text.begin() + std::max(n, 0)});
   }
   if (!found.is_same_device(device)) throw other_device(found, device);
 }

@@ -241,6 +241,12 @@ const std::vector<Bad> kTable = {
     {kWhole, "usage_page = 0xff00\n", "", "1\n[limits]", "has no effect without usage_page"},
     {kWhole, "0xff00", "0x1ff00", "0x1ff00", "from 0 to 65535, found 130816"},
     {kWhole, "serial = \"A1\"", "serial = 17", "17", "expected a text"},
+    // names reach udev rules, which root executes, and logs
+    {kWhole, "serial = \"A1\"", "serial = \"A\\n1\"", "\"A", "expected one line without control characters"},
+    {kWhole, "serial = \"A1\"", "product = \"A\\n1\"", "\"A", "expected one line without control characters"},
+    {kWhole, "name = \"p\"", "name = \"p\\nRUN+=x\"", "\"p", "expected one line without control characters"},
+    {kWhole, "name = \"p\"", "name = \"p RUN\"", "\"p", "must consist of 1 to 64 letters"},
+    {kWhole, "name = \"p\"", "name = \"\"", "\"\"", "must consist of 1 to 64 letters"},
     {kWhole, "serial", "serail", "serail", "did you mean 'serial'?"},
     {kMouse, "[match]\nusb = [\"046d:c626\", \"046d:c628\"]\n", "", "", "key 'match' is missing"},
     // limits

@@ -9,15 +9,23 @@
 #include <string>
 #include <vector>
 
+#include <fcntl.h>
+
 #include "config/calibration_store.hpp"
 #include "config/known_profiles.hpp"
+#include "core/files/opened_file.hpp"
 #include "core/transitions.hpp"
+#include "daemon/control/owned_fd.hpp"
+#include "daemon/recording/recording_reader.hpp"
 #include "devices/report_codec.hpp"
 #include "tests/fuzz/fuzz_config.hpp"
 #include "tests/fuzz/fuzz_mesh.hpp"
+#include "tests/fuzz/fuzz_recording.hpp"
 #include "tests/fuzz/fuzz_report.hpp"
+#include "tests/support/recording_mutation.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/support/sample_meshes.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 // Writes the initial corpus of a fuzz target: small valid inputs into DIRECTORY, and a dictionary of words
 // into DIRECTORY.dict. The inputs come from the shipped files and from the samples of the tests.
@@ -260,7 +268,29 @@ Seeds request_seeds() {
   return seeds;
 }
 
+/// A small recording as a file, and as the child process sends it.
+Seeds recording_seeds() {
+  const TemporaryDirectory directory;
+  const fs::path file = directory.path() / "sample.h5", stream = directory.path() / "stream";
+  write_sample_recording(file);
+  {
+    const OwnedFd out(::open(stream.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+    const OpenedFile opened(file);
+    RecordingSender sender(out.get());
+    send_hdf5(
+        opened.fd(), opened.size_bytes(), [] {}, sender);
+  }
+  const auto kind = [](RecordingInput input) { return to_char(static_cast<unsigned>(input)); };
+  Seeds seeds;
+  seeds.inputs = {kind(RecordingInput::file) + text_of(file), kind(RecordingInput::stream) + text_of(stream)};
+  for (const char* word :
+       {"OHDR", "OCHK", "FRHP", "FHDB", "BTHD", "BTLF", "TREE", "SNOD", "HEAP", "GCOL", "\x89HDF\r\n\x1a\n"})
+    seeds.words.insert(word);
+  return seeds;
+}
+
 Seeds seeds_of(const std::string& target) {
+  if (target == "fuzz_recording") return recording_seeds();
   if (target == "fuzz_events") return event_seeds();
   if (target == "fuzz_request") return request_seeds();
   if (target == "fuzz_config") return config_seeds();

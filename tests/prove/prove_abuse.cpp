@@ -33,6 +33,8 @@
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/listening_socket.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "tests/prove/abused_daemon.hpp"
+#include "tests/prove/hoarding.hpp"
 #include "tests/support/machine_load.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -43,49 +45,13 @@
 // in one recording, so other load affects them equally. Tick durations and wake latencies come from the
 // recording.
 //
-// Two further daemons follow: one whose log and live line nobody reads, and one for each signal, which must
-// run on or release the hand before it ends.
+// Further daemons follow: one whose log and live line nobody reads; one for each signal, which must run on or
+// release the hand before it ends; and one that clients try to exhaust (hoarding.hpp).
 
 namespace {
 
 using namespace wrenchd;
-using namespace std::chrono_literals;
-namespace fs = std::filesystem;
-
-std::string request(const std::string& method) {
-  return R"({"jsonrpc":"2.0","id":1,"method":")" + method + "\"}\n";
-}
-
-OwnedFd connected(const fs::path& path) {
-  OwnedFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  path.native().copy(address.sun_path, sizeof address.sun_path - 1);
-  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return {};
-  return fd;
-}
-
-/// Sends as many bytes as possible without a long wait. Returns false if the peer is gone.
-bool send_bytes(int fd, const std::string& bytes) {
-  for (std::size_t sent = 0; sent < bytes.size();) {
-    const ssize_t more = ::send(fd, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
-    if (more > 0) {
-      sent += static_cast<std::size_t>(more);
-    } else if (errno == EAGAIN) {
-      std::this_thread::sleep_for(200us);
-      return true;
-    } else {
-      return false;
-    }
-  }
-  return true;
-}
-
-void drain(int fd) {
-  std::array<char, 65536> bytes;
-  while (::recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT) > 0) {
-  }
-}
+using namespace wrenchd::test;
 
 /// One kind of abuse, repeated until `stop` is set.
 using Abuse = void (*)(const fs::path& path, const std::atomic<bool>& wanted);
@@ -147,8 +113,7 @@ class Abusers {
     if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
       throw std::system_error(errno, std::generic_category(), "pipe");
     pid_ = ::fork();
-    if (pid_ == 0 && (geteuid() != 0 || (setgroups(0, nullptr) == 0 && setgid(uid) == 0 && setuid(uid) == 0)))
-      live(path, threads);
+    if (pid_ == 0 && become(uid)) live(path, threads);
     if (pid_ == 0) ::_exit(1);
     ::close(pipe_[0]);
   }
@@ -226,59 +191,6 @@ class Decoy {
   }
 
   OwnedFd listens_;
-  pid_t pid_ = -1;
-};
-
-class Daemon {
- public:
-  /// log: file for standard error. output: if not negative, standard output and standard error instead.
-  Daemon(const std::string& program, std::vector<std::string> words, const fs::path& log, int output = -1) {
-    words.insert(words.begin(), program);
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                     0600);
-    if (output >= 0) {
-      posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
-      posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
-    }
-    const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw std::system_error(error, std::generic_category(), program);
-  }
-  ~Daemon() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Daemon(const Daemon&) = delete;
-  Daemon& operator=(const Daemon&) = delete;
-
-  bool lives() const { return ::waitpid(pid_, nullptr, WNOHANG) == 0; }
-  void signal(int number) const { ::kill(pid_, number); }
-  /// Returns true if the process has ended within this time.
-  bool ends_within(std::chrono::milliseconds limit) {
-    for (const auto end = std::chrono::steady_clock::now() + limit; std::chrono::steady_clock::now() < end;
-         std::this_thread::sleep_for(2ms))
-      if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
-        pid_ = -1;
-        return true;
-      }
-    return false;
-  }
-  /// Ends the process. Returns its exit code; -1 if a signal ended it.
-  int end() {
-    ::kill(pid_, SIGTERM);
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
- private:
   pid_t pid_ = -1;
 };
 
@@ -515,7 +427,6 @@ int main(int argc, char** argv) {
       test::MachineLoad().throw_if_busy();
       throw std::runtime_error("the daemon is not disarmed 5 s after its start");
     }
-    constexpr uid_t kNobody = 65534;
     const Decoy decoy(files.path() / "decoy.sock");
     Abusers busy(files.path() / "decoy.sock", threads, kNobody);
     Abusers abusers(socket, threads, kNobody);
@@ -571,6 +482,8 @@ int main(int argc, char** argv) {
     if (stalled.end_ms > kMostEnd_ms) violation("a stalled reader of the log delays the end of the daemon");
     const Walk walk = walk_signals(program, files.path());
     violations += walk.unreleased;
+    const Hoarding hoarding = hoard(program, files.path());
+    for (const std::string& what : hoarding.violations) violation(what);
     // The daemon shares the machine, so it may receive a timely heartbeat late. The abusers are idle by now,
     // so the measurement does not include their load.
     if (holder.lost_in_time() > 0) {
@@ -600,6 +513,10 @@ int main(int argc, char** argv) {
         "stalled_end_ms %.1f",
         walk.signals, walk.survived, walk.not_armed, walk.unreleased, stalled.slowest_status_ms,
         stalled.stop_ms, stalled.end_ms);
+    std::printf(
+        " fds %ld fd_stop_ms %.1f starved %ld asked %ld races %ld adds %ld leaks %ld big_mesh_end_ms %.0f",
+        hoarding.most_fds, hoarding.stop_ms, hoarding.refused, hoarding.asked, hoarding.swaps, hoarding.adds,
+        hoarding.leaks, hoarding.end_ms);
     std::printf(
         " slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld violations %ld seed "
         "%llu\n",

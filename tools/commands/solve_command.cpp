@@ -2,7 +2,6 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "config/load_scene.hpp"
 #include "config/pose_table.hpp"
 #include "core/contact_backend.hpp"
+#include "core/files/opened_file.hpp"
 #include "core/friction.hpp"
 #include "daemon/option_checks.hpp"
 #include "tools/commands/subcommand.hpp"
@@ -58,10 +58,13 @@ CLI::Validator friction_pair() {
 
 std::vector<Pose> read_poses_from(const std::string& name) {
   if (name == "-") return read_poses(std::cin, "standard input");
-  std::ifstream file(name);
-  if (!file || std::filesystem::is_directory(name))
-    throw PoseTableError(name + ": cannot be read; name a CSV file, or - for standard input");
-  return read_poses(file, name);
+  try {
+    std::istringstream table(read_file(name));
+    return read_poses(table, name);
+  } catch (const FileError& error) {
+    throw PoseTableError(name + ": cannot be read; name a CSV file, or - for standard input (" +
+                         error.what() + ")");
+  }
 }
 
 class SolveCommand final : public Subcommand {

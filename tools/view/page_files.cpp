@@ -2,12 +2,13 @@
 #include "tools/view/page_files.hpp"
 
 #include <array>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
 
 #include <openssl/evp.h>
 #include <openssl/sha.h>
+
+#include "core/files/opened_file.hpp"
 
 namespace wrenchd {
 namespace fs = std::filesystem;
@@ -54,9 +55,8 @@ PageFiles::PageFiles(const fs::path& directory) {
   for (fs::recursive_directory_iterator entry(directory, error), end; !error && entry != end;
        entry.increment(error)) {
     if (!entry->is_regular_file()) continue;
-    std::ifstream in(entry->path(), std::ios::binary);
     files_[entry->path().lexically_relative(directory).generic_string()] = {
-        type_of(entry->path()), std::string(std::istreambuf_iterator<char>(in), {})};
+        type_of(entry->path()), read_file_if_readable(entry->path()).value_or("")};
   }
   const auto page = files_.find("index.html");
   if (page == files_.end())

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <spawn.h>
@@ -12,6 +14,7 @@
 #include "collision/meshes/mesh_source.hpp"
 #include "daemon/control/scene_geometry.hpp"
 #include "daemon/recording/recorded_run.hpp"
+#include "tools/view/address_file.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/recorded_feed.hpp"
 #include "tools/view/view_server.hpp"
@@ -19,15 +22,22 @@
 namespace wrenchd {
 namespace {
 
+/// Opens a file in the user's browser. Returns false if xdg-open is missing.
+bool open_in_browser(const std::filesystem::path& file) {
+  std::string program = "xdg-open", name = file.string();
+  char* const words[] = {program.data(), name.data(), nullptr};
+  pid_t pid = -1;
+  return posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) == 0;
+}
+
 void serve(ViewServer& server, const ViewOptions& options) {
-  std::string url = server.url();
-  std::printf("%s\n", url.c_str());
+  std::printf("%s\n", server.url().c_str());
   std::fflush(stdout);
+  std::optional<AddressFile> address;
   if (options.open_browser) {
-    std::string program = "xdg-open";
-    char* const words[] = {program.data(), url.data(), nullptr};
-    pid_t pid = -1;
-    if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
+    address.emplace(server.url());
+    server.on_first_page([&address] { address->remove(); });
+    if (!open_in_browser(address->path()))
       std::fputs("wrenchctl: xdg-open is missing; open the address by hand\n", stderr);
   }
   server.run();

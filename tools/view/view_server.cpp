@@ -20,9 +20,11 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <sys/random.h>
+#include <unistd.h>
 
 #include "core/fault.hpp"
 #include "daemon/version.hpp"
+#include "tools/view/connection_owner.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/page_lease.hpp"
 #include "tools/view/recorded_feed.hpp"
@@ -105,6 +107,8 @@ struct ViewServer::Server {
   std::map<std::uint64_t, std::weak_ptr<Page>> pages;
   std::uint64_t last_page = 0;
   std::size_t connections = 0;
+  IdentifyConnection identify;
+  std::function<void()> opened;      ///< called once, for the first page
   std::unique_ptr<PageLease> lease;  ///< its threads post to io; the destructor ends them first
   /// Declared after all that a Page uses: the last handlers of a page end with io, and with them the page.
   asio::io_context io{1};
@@ -117,6 +121,7 @@ struct ViewServer::Server {
   void accept();
   void push_frames();
   void tell(const PageLease::Reply& reply);
+  bool is_permitted(const tcp::socket& socket) const;
 
   bool is_ours(beast::string_view authority) const {
     const std::string number = ":" + std::to_string(port);
@@ -366,6 +371,7 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
       return reject(http::status::method_not_allowed, "Only the method GET is supported.\n");
     const PageFiles::File* file = server_.files.find(*name);
     if (file == nullptr) return reject(http::status::not_found, "The file does not exist.\n");
+    if (server_.opened) std::exchange(server_.opened, {})();
     respond(http::status::ok, file->type, file->bytes);
   }
 
@@ -419,10 +425,20 @@ ViewServer::Server::Server(std::uint16_t requested_port, PageFiles page_files)
   });
 }
 
+/// Returns true if the other end belongs to the user of this process, or to root. The connection of another
+/// user does not count, so that it takes no place from the owner.
+bool ViewServer::Server::is_permitted(const tcp::socket& socket) const {
+  beast::error_code error;
+  const tcp::endpoint peer = socket.remote_endpoint(error);
+  if (error) return false;
+  const std::optional<uid_t> owner = identify(peer.port(), port);
+  return owner && (*owner == ::geteuid() || *owner == 0);
+}
+
 void ViewServer::Server::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error && connections < kMaxConnections) {
+    if (!error && connections < kMaxConnections && is_permitted(socket)) {
       socket.set_option(tcp::no_delay(true), error);
       ++connections;
       std::make_shared<Visit<Server>>(std::move(socket), *this)->read();
@@ -468,8 +484,13 @@ void ViewServer::Server::tell(const PageLease::Reply& reply) {
                 {"error", reply.error}});
 }
 
-ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed)
+std::optional<uid_t> ViewServer::identify_connection(std::uint16_t peer_port, std::uint16_t own_port) {
+  return connection_owner(peer_port, own_port);
+}
+
+ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed, IdentifyConnection identify)
     : server_(std::make_unique<Server>(port, std::move(files))) {
+  server_->identify = std::move(identify);
   server_->live = &feed;
   server_->lease =
       std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Reply& reply) {
@@ -477,8 +498,10 @@ ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed)
       });
 }
 
-ViewServer::ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& feed)
+ViewServer::ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& feed,
+                       IdentifyConnection identify)
     : server_(std::make_unique<Server>(port, std::move(files))) {
+  server_->identify = std::move(identify);
   server_->recorded = &feed;
 }
 
@@ -486,6 +509,10 @@ ViewServer::~ViewServer() = default;
 
 std::string ViewServer::url() const {
   return "http://127.0.0.1:" + std::to_string(server_->port) + "/" + server_->token + "/";
+}
+
+void ViewServer::on_first_page(std::function<void()> opened) {
+  server_->opened = std::move(opened);
 }
 
 void ViewServer::run() {

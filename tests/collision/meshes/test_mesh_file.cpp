@@ -200,7 +200,7 @@ TEST_CASE("a file that is no mesh is rejected with its name and a remedy") {
   CHECK(rejection_text(dir.path() / "missing.off") ==
         (dir.path() / "missing.off").string() + ": no such file; check the path in the scene");
   fs::create_directory(dir.path() / "folder.off");
-  CHECK(rejection_text(dir.path() / "folder.off").find("is not a file; name an OFF, OBJ, STL or PLY file") !=
+  CHECK(rejection_text(dir.path() / "folder.off").find("is a directory; name a file in it") !=
         std::string::npos);
   CHECK(rejection_text("").find("no such file") != std::string::npos);
   const std::string off = as_off(kBox);

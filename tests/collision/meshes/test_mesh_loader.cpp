@@ -3,6 +3,7 @@
 
 #include "collision/meshes/convex_hull.hpp"
 #include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_cache.hpp"
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/meshes/mesh_loader.hpp"
 #include "collision/scene.hpp"
@@ -237,6 +238,42 @@ std::size_t size_of_members(T thing) {
 TEST_CASE("the cache stores every data member", "[mesh_loader]") {
   CHECK(size_of_members(MeshSurface()) == sizeof(MeshSurface));
   CHECK(size_of_members(TriangleBvh()) == sizeof(TriangleBvh));
+}
+
+TEST_CASE("a loader keeps the bytes that it has read, and their hash beyond 32 MiB", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const std::string bytes = as_off(kBox);
+  const fs::path file = dir.write("box.off", bytes);
+  MeshLoader loader;
+  loader.load(file, BodyKind::solid);
+  dir.write("box.off", "changed afterwards");
+  const MeshInput* input = loader.input(file);
+  REQUIRE(input != nullptr);
+  REQUIRE(input->bytes);
+  CHECK(*input->bytes == bytes);
+  CHECK(input->sha256 == sha256_text(bytes));
+  CHECK(sha256_text("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  CHECK(loader.input(dir.path() / "other.off") == nullptr);
+
+  // The next scene uses the mesh that is loaded, and not the file as it is now.
+  MeshLoader next = loader;
+  next.begin_scene();
+  CHECK(next.input(file) == nullptr);
+  CHECK_NOTHROW(next.load(file, BodyKind::solid));
+  next.drop_unused();
+  CHECK(*next.input(file)->bytes == bytes);
+  next.begin_scene();
+  next.drop_unused();
+  CHECK_THROWS_AS(next.load(file, BodyKind::solid), MeshError);
+
+  MeshLoader large;
+  const fs::path first = dir.write("first.off", bytes + std::string(20 << 20, '\n'));
+  const fs::path second = dir.write("second.off", bytes + std::string(20 << 20, '\n'));
+  large.load(first, BodyKind::solid);
+  large.load(second, BodyKind::solid);
+  CHECK(large.input(first)->bytes);
+  CHECK_FALSE(large.input(second)->bytes);
+  CHECK(large.input(second)->sha256 == large.input(first)->sha256);
 }
 
 TEST_CASE("numbers have thousands separators", "[mesh_loader]") {

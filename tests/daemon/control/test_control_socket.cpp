@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <span>
 #include <sstream>
 
@@ -594,18 +595,22 @@ TEST_CASE("a slow method blocks no other client, and its response follows when i
   CHECK(patient.error_code("status") == 0);
   CHECK(patient.error_code("test.wait") == code_of(RpcCode::invalid_state));
   std::vector<RigClient> others;
-  for (std::size_t i = 0; i < WorkerQueue::kMaxQueued + 2; ++i) {
+  for (std::size_t i = 0; i < WorkerQueue::kMaxQueuedPerUser + 2; ++i) {
     others.push_back(rig.connect(TestUser::observer));
     others.back().send(request("test.wait", "{}", "\"w\""));
-    if (i >= WorkerQueue::kMaxQueued) CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
+    if (i >= WorkerQueue::kMaxQueuedPerUser)
+      CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
     CHECK(others.back().error_code("status") == 0);
   }
+  RigClient another = rig.connect(TestUser::operator_);  // another user finds a place
+  another.send(request("test.wait", "{}", "\"w\""));
   others.front().disconnect();
   go = true;
   const auto line = patient.read_line();
   REQUIRE(line);
   CHECK(Json::parse(*line)["result"].contains("client"));
   CHECK(next_code(others[1]) == 0);
+  CHECK(next_code(another) == 0);
 }
 
 TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
@@ -646,6 +651,66 @@ TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
   char byte = 0;
   CHECK(::read(read_end.get(), &byte, 1) == 1);
   CHECK(byte == 'x');
+}
+
+TEST_CASE("replies with descriptors that nobody reads are bounded, and the excess is an error",
+          "[control_socket]") {
+  const MethodRow open{
+      "test.open", Role::observer, {}, "Opens a file.", [&](const Json&, const Caller&) {
+        return MethodResult(Json{{"open", true}}, OwnedFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)));
+      }};
+  ControlRig rig(resting_config(), {open});
+  const auto open_fds = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
+                         std::filesystem::directory_iterator());
+  };
+  std::vector<RigClient> hoarders;
+  for (int i = 0; i < 20; ++i) hoarders.push_back(rig.connect(TestUser::observer));
+  const auto before = open_fds();
+  for (int round = 0; round < 40; ++round)
+    for (RigClient& one : hoarders) one.send(request("test.open", "{}", "1"));
+  std::this_thread::sleep_for(500ms);
+  CHECK(open_fds() - before <= static_cast<long>(kMaxUserDescriptors));
+  // Another user receives one, and a reader of the first user too as soon as it has read.
+  RigClient other = rig.connect(TestUser::operator_);
+  CHECK(other.error_code("test.open") == 0);
+  long with = 0, without = 0;
+  for (RigClient& one : hoarders)
+    while (const auto line = one.read_line(50ms))
+      (Json::parse(*line).contains("error") ? without : with) += 1;
+  CHECK(with <= static_cast<long>(kMaxUserDescriptors));
+  CHECK(with + without == 800);
+  CHECK(hoarders.front().error_code("test.open") == 0);
+}
+
+TEST_CASE("a reply whose descriptor cannot be made is an error", "[control_socket]") {
+  const MethodRow open{
+      "test.open", Role::observer, {}, "Has a descriptor that is closed.", [](const Json&, const Caller&) {
+        return MethodResult(Json{{"open", true}}, 9999);
+      }};
+  MethodRow slow = open;
+  slow.name = "test.slow";
+  slow.slow = true;
+  ControlRig rig(resting_config(), {open, slow});
+  RigClient client = rig.connect(TestUser::observer);
+  CHECK(client.error_code("test.open") == code_of(RpcCode::invalid_state));
+  CHECK(client.error_code("test.slow") == code_of(RpcCode::invalid_state));
+  CHECK(client.error_code("status") == 0);
+}
+
+TEST_CASE("an observer's connections leave places for other users", "[control_socket]") {
+  ControlRig rig;
+  std::vector<RigClient> many;
+  for (std::size_t i = 0; i < kMaxObserverClients; ++i) {
+    many.push_back(rig.connect(TestUser::observer));
+    CHECK(many.back().error_code("status") == 0);
+  }
+  RigClient other = rig.connect(TestUser::operator_);
+  CHECK(other.error_code("status") == 0);
+  RigClient more = rig.connect(TestUser::observer);
+  CHECK(more.error_code("status") == 0);
+  CHECK_FALSE(many.front().read_line(1s)->empty());  // why its connection ends
+  CHECK(other.error_code("status") == 0);
 }
 
 TEST_CASE("a daemon that ends sends an event to its subscribers, and disconnects", "[control_socket]") {

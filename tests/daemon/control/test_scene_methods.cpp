@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <filesystem>
 #include <string>
 
 #include <catch2/catch.hpp>
 
 #include "daemon/control/scene_methods.hpp"
 #include "tests/support/shipped_config.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 // Clients read and change the rendering: each request is looked up in the method table, with a role and
 // parameters in JSON.
@@ -29,7 +31,9 @@ struct Rig {
   Json ask(const std::string& method, const Json& params = Json::object(),
            Role role = Role::administrator) const {
     const RpcRequest request{method, params, 1, true};
-    return MethodTable::run(table.look_up(request, role), params, {}).result;
+    Caller caller;
+    caller.role = role;
+    return MethodTable::run(table.look_up(request, role), params, caller).result;
   }
   /// Returns the error that the request is answered with.
   RpcError rejected(const std::string& method, const Json& params, Role role = Role::administrator) const {
@@ -126,6 +130,46 @@ TEST_CASE("an invalid change is rejected with its location, and nothing changes"
   has(a.rejected("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
       "exact");
   CHECK(a.ask("scene.get") == before);
+}
+
+TEST_CASE("an operator loads files beneath the directories of the configuration only, and reads nothing of them",
+          "[scene_methods]") {
+  const TemporaryDirectory dir;
+  const std::string secret = "root:$6$sEcReT:19000:0:99999:7:::";
+  const std::filesystem::path shadow = dir.write("private/shadow", secret + "\nOFF\n");
+  dir.write("scenes/broken.off", "OFF\n" + secret + "\n");
+  dir.write("scenes/broken.toml", secret + "\n");
+  std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.off");
+  std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.toml");
+  std::filesystem::copy_file(WRENCHD_SOURCE_DIR "/config/meshes/cube.off", dir.path() / "scenes/cube.off");
+  RunConfig plan = shipped_config();
+  plan.settings.scene = dir.path() / "scenes/configured.toml";
+  const Rig a(plan);
+  const auto add = [&](const std::filesystem::path& mesh) {
+    Json block = a_block();
+    block["mesh"] = mesh.string();
+    return Json{{"obstacle", block}};
+  };
+  const auto refuses = [&](const char* method, const Json& params, const char* part) {
+    const RpcError error = a.rejected(method, params, Role::operator_);
+    has(error, part);
+    CHECK(std::string(error.what()).find("sEcReT") == std::string::npos);
+  };
+  refuses("scene.add", add(dir.path() / "scenes/link.off"), "symbolic link");
+  refuses("scene.add", add(dir.path() / "scenes/broken.off"), "broken.off:2: is not a mesh that can be used");
+  refuses("scene.load", {{"file", (dir.path() / "scenes/link.toml").string()}}, "symbolic link");
+  refuses("scene.load", {{"file", (dir.path() / "scenes/broken.toml").string()}}, "broken.toml:1:");
+  // The answer does not say whether the file exists.
+  for (const auto& file : {shadow, dir.path() / "private/none"}) {
+    refuses("scene.add", add(file), "outside of the directories");
+    refuses("scene.load", {{"file", file.string()}}, "outside of the directories");
+    refuses("scene.load", {{"file", (dir.path() / "scenes/../private").string() + "/" + file.filename().string()}},
+            "outside of the directories");
+  }
+  CHECK(a.obstacles() == std::vector<std::string>{"table"});
+  CHECK(a.ask("scene.add", add(dir.path() / "scenes/cube.off"), Role::operator_)["name"] == "block");
+  // Whoever may configure reads why.
+  has(a.rejected("scene.add", add(dir.path() / "scenes/broken.off")), "sEcReT");
 }
 
 TEST_CASE("workspace.set applies all values or none", "[scene_methods]") {

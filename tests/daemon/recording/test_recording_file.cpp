@@ -5,8 +5,10 @@
 
 #include <catch2/catch.hpp>
 #include <hdf5.h>
+#include <sys/stat.h>
 
 #include "daemon/recording/recording_file.hpp"
+#include "daemon/servo/record_fields.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -43,6 +45,15 @@ TickRecord random_record(RandomValues& random) {
   r.energy = -0.0;
   r.kkt_residual = std::numeric_limits<double>::denorm_min();
   r.authority = std::numeric_limits<double>::infinity();
+  // A value that stands for a name has one.
+  for (const RecordField& field : tick_fields()) {
+    const std::size_t names = value_names(field.values).size();
+    if (names == 0 || is_bits(field.values)) continue;
+    auto* const lowest = reinterpret_cast<unsigned char*>(&r) + field.offset;
+    const auto value = static_cast<unsigned char>(random.bits() % names);
+    std::memset(lowest, 0, field.bytes());
+    *lowest = value;
+  }
   return r;
 }
 
@@ -240,6 +251,136 @@ TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "
     }
   }
   CHECK(rejected > 20);
+}
+
+/// Changes a recording through libhdf5. Returns the error of reading it.
+template <class Change>
+std::string rejection_after(const TemporaryDirectory& directory, const Change& change) {
+  static int number = 0;
+  const auto file = directory.path() / ("changed" + std::to_string(++number) + ".h5");
+  RandomValues random(8);
+  {
+    RecordingHeader header;
+    header.scene = "scene text";
+    header.files.push_back({"tool", "tool.off", std::string(64, '0'), true, "OFF"});
+    RecordingWriter writer(file, header);
+    writer.append(std::vector<TickRecord>(3, random_record(random)));
+  }
+  const hid_t id = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  REQUIRE(id >= 0);
+  change(id);
+  H5Fclose(id);
+  try {
+    read_recording(file);
+  } catch (const RecordingError& error) {
+    CHECK_THAT(error.what(), Catch::StartsWith(file.string() + ": "));
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("a recording that refers to other files or has other types is rejected with the reason", "[recording]") {
+  using Catch::Contains;
+  const TemporaryDirectory directory;
+  const std::string secret = directory.write("secret", "root:$6$sEcReT:1:0:9:7:::\n").string();
+  CHECK(rejection_after(directory, [](hid_t) {}).empty());
+
+  const auto external_text = [&](hid_t file, const char* name) {
+    H5Ldelete(file, name, H5P_DEFAULT);
+    const hid_t plan = H5Pcreate(H5P_DATASET_CREATE), type = H5Tcopy(H5T_C_S1);
+    H5Pset_external(plan, secret.c_str(), 0, 16);
+    H5Tset_size(type, 16);
+    const hid_t space = H5Screate(H5S_SCALAR);
+    const hid_t set = H5Dcreate2(file, name, type, space, H5P_DEFAULT, plan, H5P_DEFAULT);
+    REQUIRE(set >= 0);
+    H5Dclose(set), H5Sclose(space), H5Tclose(type), H5Pclose(plan);
+  };
+  for (const char* name : {"/config/scene", "/config/settings"}) {
+    const std::string text = rejection_after(directory, [&](hid_t file) { external_text(file, name); });
+    CHECK_THAT(text, Contains("takes its data from another file (external storage)") && !Contains("sEcReT"));
+  }
+  CHECK_THAT(rejection_after(directory,
+                             [&](hid_t file) {
+                               H5Ldelete(file, "/meshes/tool", H5P_DEFAULT);
+                               H5Lcreate_external(secret.c_str(), "/tool", file, "/meshes/tool", H5P_DEFAULT,
+                                                  H5P_DEFAULT);
+                             }),
+             Contains("'tool' is a link to another file"));
+  CHECK_THAT(rejection_after(directory,
+                             [](hid_t file) {
+                               H5Ldelete(file, "/ticks", H5P_DEFAULT);
+                               H5Lcreate_soft("/contacts", file, "/ticks", H5P_DEFAULT, H5P_DEFAULT);
+                             }),
+             Contains("'ticks' is a symbolic link"));
+  CHECK_THAT(rejection_after(directory,
+                             [](hid_t file) {
+                               H5Ldelete(file, "/ticks", H5P_DEFAULT);
+                               const hid_t group = H5Gcreate2(file, "/ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+                               H5Gclose(group);
+                             }),
+             Contains("'ticks' is no table and no text"));
+  CHECK_THAT(rejection_after(directory,
+                             [](hid_t file) {
+                               H5Ldelete(file, "/ticks", H5P_DEFAULT);
+                               const hsize_t rows = 4;
+                               const hid_t plan = H5Pcreate(H5P_DATASET_CREATE), row = H5Tcreate(H5T_COMPOUND, 8);
+                               H5Tinsert(row, "tick", 0, H5T_NATIVE_DOUBLE);
+                               const hid_t space = H5Screate_simple(1, &rows, nullptr);
+                               H5Pset_virtual(plan, space, "/etc/passwd", "/ticks", space);
+                               const hid_t set =
+                                   H5Dcreate2(file, "/ticks", row, space, H5P_DEFAULT, plan, H5P_DEFAULT);
+                               REQUIRE(set >= 0);
+                               H5Dclose(set), H5Sclose(space), H5Tclose(row), H5Pclose(plan);
+                             }),
+             Contains("takes its data from other data sets (virtual storage)"));
+  CHECK_THAT(rejection_after(directory,
+                             [](hid_t file) {
+                               H5Ldelete(file, "/meshes/tool", H5P_DEFAULT);
+                               const hsize_t many = hsize_t{1} << 40, piece = 1 << 16;
+                               const hid_t plan = H5Pcreate(H5P_DATASET_CREATE);
+                               H5Pset_chunk(plan, 1, &piece);
+                               const hid_t space = H5Screate_simple(1, &many, nullptr);
+                               const hid_t set = H5Dcreate2(file, "/meshes/tool", H5T_NATIVE_UINT8, space,
+                                                            H5P_DEFAULT, plan, H5P_DEFAULT);
+                               const std::uint8_t one = 1;
+                               const hid_t scalar = H5Screate(H5S_SCALAR);
+                               const hid_t embedded = H5Acreate2(set, "embedded", H5T_NATIVE_UINT8, scalar,
+                                                                 H5P_DEFAULT, H5P_DEFAULT);
+                               H5Awrite(embedded, H5T_NATIVE_UINT8, &one);
+                               H5Aclose(embedded), H5Sclose(scalar);
+                               H5Dclose(set), H5Sclose(space), H5Pclose(plan);
+                             }),
+             Contains("claims more bytes than the file can hold"));
+  // A column of another type, and a value that no program has a name for.
+  CHECK_THAT(rejection_after(directory,
+                             [](hid_t file) {
+                               H5Ldelete(file, "/contacts", H5P_DEFAULT);
+                               const hsize_t none = 0;
+                               const hid_t text = H5Tcopy(H5T_C_S1), row = H5Tcreate(H5T_COMPOUND, 400);
+                               H5Tset_size(text, H5T_VARIABLE);
+                               std::size_t at = 0;
+                               for (const RecordField& field : contact_fields())
+                                 H5Tinsert(row, field.name, (at += 8), text);
+                               const hid_t space = H5Screate_simple(1, &none, nullptr);
+                               const hid_t set = H5Dcreate2(file, "/contacts", row, space, H5P_DEFAULT,
+                                                            H5P_DEFAULT, H5P_DEFAULT);
+                               REQUIRE(set >= 0);
+                               H5Dclose(set), H5Sclose(space), H5Tclose(row), H5Tclose(text);
+                             }),
+             Contains("has another type than in a recording"));
+  const auto file = directory.path() / "value.h5";
+  TickRecord tick;
+  tick.state = 200;
+  { RecordingWriter(file, {}).append(std::vector<TickRecord>(2, tick)); }
+  CHECK_THROWS_WITH(read_recording(file), Contains("column 'state' of table 'ticks' has the value 200 in row 0"));
+}
+
+TEST_CASE("a FIFO or a device in place of a recording is named as what it is", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto fifo = directory.path() / "fifo.h5";
+  REQUIRE(::mkfifo(fifo.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(read_recording(fifo), Catch::Contains("is a FIFO; name a regular file"));
+  CHECK_THROWS_WITH(read_recording("/dev/zero"), Catch::Contains("is a character device"));
 }
 
 TEST_CASE("recordings are rejected with the file and the remedy", "[recording]") {

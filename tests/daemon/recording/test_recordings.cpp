@@ -312,6 +312,45 @@ TEST_CASE("a recording that begins after a change of the scene has the text of t
   CHECK_THAT(changed.scene, Contains("as clients of wrenchd have changed it") && !Contains("post"));
 }
 
+TEST_CASE("a recording contains the mesh that was loaded, whatever its file has become", "[recording]") {
+  const TemporaryDirectory files;
+  const std::string mesh = [] {
+    std::ifstream in(WRENCHD_SOURCE_DIR "/config/meshes/cube.off", std::ios::binary);
+    return std::string{std::istreambuf_iterator<char>(in), {}};
+  }();
+  const auto file = files.write("tool.off", mesh), secret = files.write("secret", "root:$6$sEcReT:1:0:9:7:::\n");
+  RunConfig plan = plan_with(files.path());
+  plan.scene.tool.mesh = file;
+  VirtualRuntime s(plan);
+  std::filesystem::remove(file);
+  std::filesystem::create_symlink(secret, file);
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
+  const auto tool = [&](const char* name) {
+    const auto recording = recordings.start(name, false);
+    s.run(0.01);
+    recordings.stop();
+    for (const RecordedFile& one : read_recording(recording).header.files)
+      if (one.role == "tool") return one.bytes;
+    return std::string();
+  };
+  CHECK(tool("at_start") == mesh);
+  // A change of another obstacle reads the file of the tool no more.
+  TomlNode block;
+  block.value = TomlNode::Table{};
+  const auto set = [&block](const char* key, TomlNode::Value value) {
+    TomlEntry entry;
+    entry.key = key;
+    entry.node.value = std::move(value);
+    std::get<TomlNode::Table>(block.value).push_back(std::move(entry));
+  };
+  set("name", std::string("block"));
+  set("mesh", std::string(WRENCHD_SOURCE_DIR "/config/meshes/cube.off"));
+  set("scale", 0.001);
+  CHECK(s.runtime.reconfigurator().insert_obstacle(block, "test") == "block");
+  CHECK(tool("changed") == mesh);
+}
+
 TEST_CASE("a header of a recording does not wait while another scene is being built", "[recording]") {
   const TemporaryDirectory files;
   VirtualRuntime s(plan_with(files.path()));

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -76,6 +78,55 @@ TEST_CASE("the live view ends while pages are open", "[view]") {
   const TemporaryDirectory directory;
   LiveFeed feed((directory.path() / "nobody.sock").string());
   end_with_open_pages(std::make_unique<ViewServer>(std::uint16_t{0}, page_files(directory), feed));
+}
+
+/// Connects to the server. Returns true if it answers a request, false if it closes the connection at once.
+bool is_answered(const std::string& url, const std::string& path) {
+  const std::string authority = url.substr(7, url.find('/', 7) - 7);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(std::stoi(authority.substr(authority.find(':') + 1))));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const OwnedFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return false;
+  const std::string request = "GET " + path + " HTTP/1.1\r\nHost: " + authority + "\r\n\r\n";
+  ::send(fd.get(), request.data(), request.size(), MSG_NOSIGNAL);
+  char byte = 0;
+  return ::recv(fd.get(), &byte, 1, 0) == 1;
+}
+
+TEST_CASE("other users get no answer, even with the token, and take no connection from the owner", "[view]") {
+  const TemporaryDirectory directory;
+  LiveFeed feed((directory.path() / "nobody.sock").string());
+  std::atomic<bool> owned{false};
+  std::atomic<int> opened{0};
+  ViewServer server(0, page_files(directory), feed, [&owned](std::uint16_t, std::uint16_t) {
+    return owned ? std::optional<uid_t>(::geteuid()) : std::optional<uid_t>(::geteuid() + 12345);
+  });
+  server.on_first_page([&opened] { ++opened; });
+  std::thread running([&] { server.run(); });
+  const std::string url = server.url(), path = url.substr(url.find('/', 7));
+  CHECK_FALSE(is_answered(url, path));
+  // More idle strangers than there are connections.
+  const std::string authority = url.substr(7, url.find('/', 7) - 7);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(std::stoi(authority.substr(authority.find(':') + 1))));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::vector<OwnedFd> strangers;
+  for (int i = 0; i < 100; ++i) {
+    strangers.emplace_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    REQUIRE(::connect(strangers.back().get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+  }
+  char byte = 0;
+  CHECK(::recv(strangers.back().get(), &byte, 1, 0) <= 0);
+  CHECK(opened == 0);
+  owned = true;
+  CHECK(is_answered(url, path));
+  CHECK(is_answered(url, path));
+  CHECK(opened == 1);
+  server.stop();
+  running.join();
 }
 
 }  // namespace

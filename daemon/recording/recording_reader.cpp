@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/recording_reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <cstdio>
+#include <ctime>
+#include <limits>
+
+#include <fcntl.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/file.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "daemon/control/owned_fd.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Processor time for reading: a fixed part, and a part for each 4 MiB of the file. libhdf5 reads more than
+/// 50 MiB of a compressed recording in a second.
+constexpr double kReading_s = 1.0;
+constexpr double kBytesPerSecond = 4.0 * 1024 * 1024;
+/// A machine under load, or a slow disk, may take this many times longer than the processor.
+constexpr double kWallFactor = 20.0;
+/// Address space for libhdf5, beside what the process had. It reads and sends rows in pieces.
+constexpr std::uint64_t kAddressSpace = std::uint64_t{1} << 30;
+/// What a recording may unpack to: a fixed part, and a multiple of the size of its file. Recordings of a hand
+/// at rest shrink to a hundredth.
+constexpr std::uint64_t kUnpackedBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kUnpackedFactor = 256;
+
+/// A sanitizer needs terabytes of address space.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+#else
+constexpr bool kSanitized = false;
+#endif
+
+/// Returns true if another process has locked the file. HDF5 locks each file that it writes.
+bool is_locked(int fd) {
+  // An own description of the file: the lock that this test takes ends with it.
+  const OwnedFd own(
+      ::open(("/proc/self/fd/" + std::to_string(fd)).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  return own && ::flock(own.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+}
+
+void limit(int resource, std::uint64_t most) noexcept {
+  const rlimit both = {most, most};
+  ::setrlimit(static_cast<__rlimit_resource>(resource), &both);
+}
+
+/// Returns the address space of this process [bytes].
+std::uint64_t address_space() noexcept {
+  unsigned long pages = 0;
+  if (std::FILE* const file = std::fopen("/proc/self/statm", "re")) {
+    if (std::fscanf(file, "%lu", &pages) != 1) pages = 0;
+    std::fclose(file);
+  }
+  return std::uint64_t{pages} * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+/// Restricts this process to reading and writing what it has open: it can open no file, start no process and
+/// use no network. All other system calls fail with EPERM. Without seccomp in the kernel the limits remain.
+void restrict_system_calls() noexcept {
+#if defined(__x86_64__)
+  constexpr std::uint32_t kArchitecture = AUDIT_ARCH_X86_64;
+#elif defined(__aarch64__)
+  constexpr std::uint32_t kArchitecture = AUDIT_ARCH_AARCH64;
+#else
+  constexpr std::uint32_t kArchitecture = 0;
+#endif
+  constexpr std::array kAllowed = {
+      SYS_read,        SYS_pread64,     SYS_readv,         SYS_lseek,          SYS_fstat,  SYS_newfstatat,
+      SYS_write,       SYS_writev,      SYS_close,         SYS_mmap,           SYS_munmap, SYS_mremap,
+      SYS_mprotect,    SYS_madvise,     SYS_brk,           SYS_futex,          SYS_flock,  SYS_fcntl,
+      SYS_exit,        SYS_exit_group,  SYS_rt_sigreturn,  SYS_rt_sigprocmask, SYS_getpid, SYS_gettid,
+      SYS_tgkill,      SYS_getrandom,   SYS_clock_gettime, SYS_sched_yield,    SYS_getcwd, SYS_rt_sigaction,
+      SYS_sigaltstack, SYS_gettimeofday};
+  if (kArchitecture == 0) return;
+  std::array<sock_filter, kAllowed.size() + 6> program{};
+  std::size_t n = 0;
+  program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch));
+  program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0);
+  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS);
+  program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr));
+  for (std::size_t i = 0; i < kAllowed.size(); ++i)
+    program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(kAllowed[i]),
+                            static_cast<std::uint8_t>(kAllowed.size() - i), 0);
+  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM);
+  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
+  const sock_fprog filter{static_cast<unsigned short>(n), program.data()};
+  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter);
+}
+
+double allowed_cpu_s(std::uint64_t file_bytes) {
+  return kReading_s + static_cast<double>(file_bytes) / kBytesPerSecond;
+}
+
+/// The child process. It keeps no signal handler and no descriptor of the parent, except the file and the
+/// pipe.
+[[noreturn]] void run_child(int file, std::uint64_t file_bytes, int pipe) noexcept {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXCPU, SIGTERM, SIGINT})
+    ::signal(signal, SIG_DFL);
+  constexpr int kFile = 3, kPipe = 4;
+  // The numbers may collide, so both move out of the way first.
+  const int file_copy = ::fcntl(file, F_DUPFD, 10), pipe_copy = ::fcntl(pipe, F_DUPFD, 10);
+  if (file_copy < 0 || pipe_copy < 0 || ::dup2(file_copy, kFile) < 0 || ::dup2(pipe_copy, kPipe) < 0)
+    ::_exit(1);
+  ::syscall(SYS_close_range, kPipe + 1, ~0U, 0);
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_FSIZE, 0);
+  limit(RLIMIT_CPU,
+        static_cast<std::uint64_t>(allowed_cpu_s(file_bytes)) + 2);  // the parent counts more finely
+  if (!kSanitized) limit(RLIMIT_AS, address_space() + kAddressSpace);
+  RecordingSender sender(kPipe);
+  try {
+    send_hdf5(
+        kFile, file_bytes,
+        [] {
+          limit(RLIMIT_NOFILE, 0);  // what is open stays open
+          restrict_system_calls();
+        },
+        sender);
+    ::_exit(0);
+  } catch (const RecordingError& error) {
+    try {
+      sender.reject(error.what());
+      ::_exit(0);
+    } catch (const std::exception&) {  // the parent has gone
+    }
+  } catch (const std::exception&) {  // no memory left
+  }
+  ::_exit(1);
+}
+
+/// The child process, as the parent sees it. The destructor ends it.
+class Child {
+ public:
+  explicit Child(pid_t pid) : pid_(pid) {
+    if (::clock_getcpuclockid(pid, &clock_) != 0) clock_ = CLOCK_MONOTONIC;
+  }
+  ~Child() {
+    ::kill(pid_, SIGKILL);
+    while (::waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  double cpu_s() const noexcept {
+    timespec used{};
+    if (clock_ == CLOCK_MONOTONIC || ::clock_gettime(clock_, &used) != 0) return 0.0;
+    return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  }
+
+ private:
+  pid_t pid_;
+  clockid_t clock_{};
+};
+
+/// Returns true for a row that was allocated but not written when the process died. HDF5 reads it as zeros.
+bool is_unwritten(const TickRow& row) {
+  return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
+}
+
+/// Returns true if all contacts of a tick were written. A row that was allocated but not written reads as
+/// zeros; a contact has a normal of unit length.
+bool has_its_contacts(const TickRow& row, const std::vector<Touch>& contacts) {
+  if (row.first_contact > contacts.size() || row.contact_count > contacts.size() - row.first_contact)
+    return false;
+  const auto first = contacts.begin() + static_cast<std::ptrdiff_t>(row.first_contact);
+  return std::none_of(first, first + row.contact_count, [](const Touch& contact) {
+    const auto* const bytes = reinterpret_cast<const unsigned char*>(&contact);
+    return std::all_of(bytes, bytes + sizeof contact, [](unsigned char byte) { return byte == 0; });
+  });
+}
+
+Recording assemble(ReceivedRecording received) {
+  std::vector<TickRow>& rows = received.ticks;
+  while (rows.size() > 1 && (is_unwritten(rows.back()) || !has_its_contacts(rows.back(), received.contacts)))
+    rows.pop_back();
+  Recording recording;
+  recording.header = std::move(received.header);
+  recording.contacts = std::move(received.contacts);
+  recording.ticks.reserve(rows.size());
+  recording.contact_ranges.reserve(rows.size());
+  for (const TickRow& row : rows) {
+    const bool valid = has_its_contacts(row, recording.contacts);
+    recording.ticks.push_back(row.tick);
+    recording.contact_ranges.push_back(valid ? ContactRange{row.first_contact, row.contact_count}
+                                             : ContactRange{});
+  }
+  return recording;
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& file) {
+  try {
+    const OpenedFile opened(file);
+    return read_recording(opened, file);
+  } catch (const FileError& error) {
+    throw RecordingError(file.string() + ": " +
+                         (error.problem() == FileProblem::missing
+                              ? "does not exist; name a recording of wrenchd"
+                              : error.what()));
+  }
+}
+
+Recording read_recording(const OpenedFile& opened, const std::filesystem::path& file) {
+  std::array<int, 2> pipe{};
+  const std::string no_process = file.string() + ": cannot be read: no process can be started; try again";
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw RecordingError(no_process);
+  const OwnedFd read_end(pipe[0]);
+  OwnedFd write_end(pipe[1]);
+  const std::uint64_t bytes = opened.size_bytes();
+  const pid_t pid = ::fork();
+  if (pid < 0) throw RecordingError(no_process);
+  if (pid == 0) run_child(opened.fd(), bytes, write_end.get());
+  const Child child(pid);
+  write_end.reset();
+  const auto begin = std::chrono::steady_clock::now();
+  const double most_cpu_s = allowed_cpu_s(bytes);
+  const auto keep_waiting = [&] {
+    const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (child.cpu_s() > most_cpu_s || wall_s > kWallFactor * most_cpu_s)
+      throw BrokenStream("libhdf5 takes longer than any recording of this size needs");
+  };
+  const std::uint64_t most = bytes < std::numeric_limits<std::uint64_t>::max() / (2 * kUnpackedFactor)
+                                 ? kUnpackedBytes + kUnpackedFactor * bytes
+                                 : std::numeric_limits<std::uint64_t>::max() / 2;
+  try {
+    return assemble(receive_recording(read_end.get(), file, most, keep_waiting));
+  } catch (const BrokenStream&) {
+    throw RecordingError(file.string() + ": is damaged: libhdf5 crashes or loops on it; use a complete copy");
+  } catch (const RecordingError&) {
+    if (is_locked(opened.fd()))
+      throw RecordingError(file.string() +
+                           ": is still being written, or another program has locked it; end the recording "
+                           "with 'wrenchctl record "
+                           "stop', or wait for the other program, and try again");
+    throw;
+  }
+}
+
+}  // namespace wrenchd
