@@ -6,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "core/finite.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -100,6 +102,7 @@ void UndrivenMotion::settle(const PathPoint& now) noexcept {
 }
 
 Vector6d UndrivenMotion::lag() const noexcept {
+  if (!started_) return Vector6d::Zero();
   Vector6d d;
   d << X_BH_.translation_m - X_BH_used_.translation_m,
       rotation_vector(X_BH_.rotation * X_BH_used_.rotation.conjugate());
@@ -167,9 +170,9 @@ Vector6d UndrivenMotion::affordable(const Vector6d& target, const SpringState& a
 std::optional<Pose> UndrivenMotion::propose(const SpringState& at) noexcept {
   const Vector6d target = lag();
   if (!at.known || target.isZero(0.0)) return {};
-  const bool whole = at.U_J == 0.0 && wait_ == 0;
-  const Vector6d d = whole || share_ <= 0.0 ? target : affordable(target, at);
-  if (d.isZero(0.0)) return {};
+  whole_ = (at.U_J == 0.0 && wait_ == 0) || share_ <= 0.0;
+  const Vector6d d = whole_ ? target : affordable(target, at);
+  if (d.isZero(0.0) || !is_finite(d.head<3>()) || !is_finite(d.tail<3>())) return {};
   return displaced(X_BH_used_, d);
 }
 
@@ -194,7 +197,7 @@ bool UndrivenMotion::accept(const Pose& X_BH, const SpringState& from, const Spr
 
 void UndrivenMotion::finish(const SpringState& at) noexcept {
   if (wait_ > 0) --wait_;
-  if (at.known && at.U_J == 0.0 && account_J_ >= 0.0) account_J_ = kInitialAccount_J;
+  if (at.known && at.U_J == 0.0 && pending_count_ == 0) account_J_ = kInitialAccount_J;
 }
 
 }  // namespace wrenchd

@@ -58,6 +58,7 @@ class UndrivenMotion {
         break;
       }
       at = render(X_BH_used_);
+      if (!whole_) break;
     }
     finish(at);
     return X_BH_used_;
@@ -65,7 +66,10 @@ class UndrivenMotion {
 
   /// Takes the measured pose at once, with an empty account. For a handle that no contact holds.
   void reset(const Pose& X_BH) noexcept;
-  void reset() noexcept { started_ = false; }
+  void reset() noexcept {
+    started_ = false;
+    account_J_ = 0.0;
+  }
 
   double account_J() const noexcept { return account_J_; }  ///< energy available to undriven motion
   /// Rotation and translation of the measured handle that the rendering does not follow [rad, m].
@@ -110,7 +114,8 @@ class UndrivenMotion {
   Pose X_BH_;       ///< measured
   Pose X_BH_used_;  ///< r
   double account_J_ = 0.0;
-  int wait_ = 0;  ///< ticks until a free handle tries the whole lag again
+  bool whole_ = false;  ///< the last proposal was the whole lag
+  int wait_ = 0;        ///< ticks until a free handle tries the whole lag again
 
   std::array<PathPoint, kHistory> path_{};  ///< newest at path_count_ - 1
   std::uint64_t path_count_ = 0;

@@ -147,21 +147,23 @@ ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdic
 /// trap a proxy.
 bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept {
   bool first = true, kept = true;
-  const auto render = [&](const Pose& X_BH) {
+  const auto move = [&](const Pose& X_BH) {
     const Pose X_WH = workspace_.update(X_BH, first ? t.dt_s : 0.0);
     if (first && stability_.set_workspace_scale(workspace_.scale())) scale_renderings();
     kept = (first ? crossfade_.project(X_WH, t.now, t.scene_time_s) : crossfade_.move(X_WH)) && kept;
     first = false;
-    return spring_state();
   };
   const bool held = active().proxy_initialization() == ProxyInitialization::complete;
   if (!undriven_.active() || !held) {
     undriven_.reset();
-    render(sample.X_BH);
+    move(sample.X_BH);
     return kept;
   }
   undriven_.set_share(contact_gain_ * sent_share);
-  undriven_.follow(sample.X_BH, sample.device_time_s, render);
+  undriven_.follow(sample.X_BH, sample.device_time_s, [&](const Pose& X_BH) {
+    move(X_BH);
+    return spring_state();
+  });
   return kept;
 }
 
