@@ -71,8 +71,7 @@ void UndrivenMotion::reset(const Pose& X_BH) noexcept {
 void UndrivenMotion::move_driven(const Pose& X_BH, double device_time_s) noexcept {
   if (!started_) reset(X_BH);
   Vector6d d;
-  d << X_BH.translation_m - X_BH_.translation_m,
-      rotation_vector(X_BH.rotation * X_BH_.rotation.conjugate());
+  d << X_BH.translation_m - X_BH_.translation_m, rotation_vector(X_BH.rotation * X_BH_.rotation.conjugate());
   d = masked(d, driven_);
   X_BH_ = X_BH;
   if ((driven_ & kAngularDofs) != 0) X_BH_used_ = displaced(X_BH_used_, d);

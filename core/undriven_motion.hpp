@@ -15,8 +15,8 @@ namespace wrenchd {
 
 /// The springs of the contact at one handle pose.
 struct SpringState {
-  double U_J = 0.0;  ///< potential energy
-  Wrench F_B;        ///< minus the gradient of U at fixed obstacles: on the hand, about H, in axes of B
+  double U_J = 0.0;   ///< potential energy
+  Wrench F_B;         ///< minus the gradient of U at fixed obstacles: on the hand, about H, in axes of B
   bool known = true;  ///< false: the potential is not known; undriven motion then waits
 };
 
@@ -36,8 +36,8 @@ class UndrivenMotion {
   /// False if the device drives all axes that it senses, or none: then the pose passes unchanged.
   bool active() const noexcept { return free_ != kNoDof; }
 
-  /// K_H: bound on the curvature of U, the linearised spring at the handle in axes of H. delay_s: longest time
-  /// from a sample to the motors that act on it, half a period of the loop included.
+  /// K_H: bound on the curvature of U, the linearised spring at the handle in axes of H. delay_s: longest
+  /// time from a sample to the motors that act on it, half a period of the loop included.
   void set_loop(const Matrix6d& K_H, double delay_s) noexcept;
   /// Share of the requested wrench that reaches the hand, 0 to 1. Energy counts by this share.
   void set_share(double share) noexcept { share_ = share; }

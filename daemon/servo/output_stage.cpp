@@ -8,8 +8,8 @@
 namespace wrenchd {
 namespace {
 
-/// Ratio of the sent force to the requested one, or of the torques if that is less, 0 to 1. Without a request,
-/// returns `otherwise`.
+/// Ratio of the sent force to the requested one, or of the torques if that is less, 0 to 1. Without a
+/// request, returns `otherwise`.
 double share_of(const Wrench& sent, const Wrench& requested, double otherwise) noexcept {
   double share = 1.0;
   bool any = false;

@@ -142,9 +142,9 @@ ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdic
   return contact();
 }
 
-/// Moves the renderings to the sample's pose. On a device that senses motion which no motor drives, they follow
-/// that motion only as far as they stay passive: core/METHOD.md, section 11.5. Returns false if moving obstacles
-/// trap a proxy.
+/// Moves the renderings to the sample's pose. On a device that senses motion which no motor drives, they
+/// follow that motion only as far as they stay passive: core/METHOD.md, section 11.5. Returns false if moving
+/// obstacles trap a proxy.
 bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept {
   bool first = true, kept = true;
   const auto move = [&](const Pose& X_BH) {
@@ -171,8 +171,8 @@ bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, cons
 SpringState Renderer::spring_state() const noexcept {
   const Rendering& rendering = active();
   SpringState state;
-  state.known = crossfade_.next() == nullptr &&
-                rendering.depth().projection.status != ProjectionStatus::budget_spent;
+  state.known =
+      crossfade_.next() == nullptr && rendering.depth().projection.status != ProjectionStatus::budget_spent;
   state.U_J = rendering.spring_potential_J();
   state.F_B = on_hand(rendering, rendering.spring_F_T());
   return state;
@@ -264,8 +264,7 @@ Wrench Renderer::contact_wrench(const Rendering& rendering) const noexcept {
 }
 
 Wrench Renderer::on_hand(const Rendering& rendering, const Wrench& F_T) const noexcept {
-  return workspace_.wrench_on_hand(
-      wrench_about(workspace_.X_WH().translation_m, rendering.X_WP(), F_T));
+  return workspace_.wrench_on_hand(wrench_about(workspace_.X_WH().translation_m, rendering.X_WP(), F_T));
 }
 
 Wrench Renderer::local_model_wrench(const DeviceSample& sample, const TickTime& t) noexcept {

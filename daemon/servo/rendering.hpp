@@ -37,8 +37,8 @@ class Rendering {
   /// exists, requests or takes a proxy initialization instead. Returns false if moving obstacles trap the
   /// proxy; the caller must then call invalidate_proxy(). RT-safe.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
-  /// Moves p of this tick to another handle pose, and q after it; the obstacles stay as in the last project().
-  /// Returns false if no admissible pose is left. Does nothing without a valid proxy. RT-safe.
+  /// Moves p of this tick to another handle pose, and q after it; the obstacles stay as in the last
+  /// project(). Returns false if no admissible pose is left. Does nothing without a valid proxy. RT-safe.
   bool move(const Pose& X_WH) noexcept;
   /// Computes the body wrench for the poses of the last project(). dt_s: device time since the last call.
   /// RT-safe.

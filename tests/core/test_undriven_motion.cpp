@@ -185,7 +185,7 @@ TEST_CASE("a rotation that lowers the potential is followed, and pays for one th
     undriven.follow(X, 0.4 + i * kTick_s, stick_on_floor);
     if (i < 190) CHECK(undriven.lag_rad() < 1e-9);
   }
-  CHECK(undriven.lag_rad() == Approx(0.1).epsilon(0.05));  // the account paid for the way back, not for more
+  CHECK(undriven.lag_rad() == Approx(0.1).epsilon(0.1));  // the account paid for the way back, not for more
   CHECK(undriven.account_J() < 2e-6);
 }
 

@@ -260,8 +260,9 @@ class Host {
     coupling.stiffness = energy_stiffness(M_, kStiff_per_s2);
     coupling.stiffness.bottomRightCorner<3, 3>() *= options_.pid ? options_.angular_share : 1.0;
     coupling.damping = d / (1.0 - d) * (0.5 * loop.period_s + loop.delay_s) * coupling.stiffness;
-    const double scale = circumstances_.share *
-                         stability_bound(device, loop, coupling, circumstances_.X_HT, options_.drives, step).scale;
+    const double scale =
+        circumstances_.share *
+        stability_bound(device, loop, coupling, circumstances_.X_HT, options_.drives, step).scale;
     stiffness_per_s2_ = scale * kStiff_per_s2;
     WrenchGains gains;
     gains.stiffness = scale * coupling.stiffness;

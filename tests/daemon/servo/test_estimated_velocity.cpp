@@ -28,7 +28,11 @@ using HandMotion = std::function<Vector3d(double t_s)>;
 
 RunConfig config_for(const std::string& profile, const HandMotion& motion, double duration_s) {
   return test::prescribed_motion(
-      profile, [&](double t_s) { return Pose{Quaterniond::Identity(), motion(t_s)}; }, duration_s);
+      profile,
+      [&](double t_s) {
+        return Pose{Quaterniond::Identity(), motion(t_s)};
+      },
+      duration_s);
 }
 
 constexpr Vector3d::Scalar kFreeHeight_m = 0.04;

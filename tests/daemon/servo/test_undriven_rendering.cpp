@@ -24,8 +24,8 @@ constexpr double kLoopStart_s = 3.0;
 constexpr double kRounds = 3.0;
 constexpr double kTilt_rad = 0.3, kDepth_m = 0.006;
 
-/// Rests above the table, tilts, comes down on an edge of the shipped cube, and goes round a closed path of 4 mm
-/// and 0.3 rad once a second. sense 1: the path on which the measured rotation would give energy.
+/// Rests above the table, tilts, comes down on an edge of the shipped cube, and goes round a closed path of 4
+/// mm and 0.3 rad once a second. sense 1: the path on which the measured rotation would give energy.
 Pose loop_motion(double t_s, double sense) {
   const auto ramp = [&](double from_s, double to_s) {
     const double x = std::clamp((t_s - from_s) / (to_s - from_s), 0.0, 1.0);
@@ -46,10 +46,10 @@ struct Work {
 };
 
 struct Result {
-  Work sent;                     ///< of the sent force, in the rounds
-  Work gradient;                 ///< of the force at the measured pose, in the rounds
-  double least_share = 1.0;      ///< least ratio of the two forces
-  double least_scale = 1.0;      ///< of the passivity guard
+  Work sent;                 ///< of the sent force, in the rounds
+  Work gradient;             ///< of the force at the measured pose, in the rounds
+  double least_share = 1.0;  ///< least ratio of the two forces
+  double least_scale = 1.0;  ///< of the passivity guard
   double largest_lag_rad = 0.0;
 };
 
@@ -97,15 +97,19 @@ Result go_round(double sense) {
     result.least_scale = std::min(result.least_scale, run.record.passivity_scale);
     result.largest_lag_rad = std::max(result.largest_lag_rad, run.record.undriven_lag_rad);
   });
-  std::printf("sense %+.0f: gradient net %.3f mJ a round (out %.2f in %.2f), sent net %.3f mJ, least share %.3f, guard %.3f, lag %.3f rad\n",
-              sense, 1e3 * result.gradient.net_J() / kRounds, 1e3 * result.gradient.given_J / kRounds, 1e3 * result.gradient.taken_J / kRounds,
-              1e3 * result.sent.net_J() / kRounds, result.least_share, result.least_scale, result.largest_lag_rad);
+  std::printf(
+      "sense %+.0f: gradient net %.3f mJ a round (out %.2f in %.2f), sent net %.3f mJ, least share %.3f, "
+      "guard %.3f, lag %.3f rad\n",
+      sense, 1e3 * result.gradient.net_J() / kRounds, 1e3 * result.gradient.given_J / kRounds,
+      1e3 * result.gradient.taken_J / kRounds, 1e3 * result.sent.net_J() / kRounds, result.least_share,
+      result.least_scale, result.largest_lag_rad);
   return result;
 }
 
 }  // namespace
 
-TEST_CASE("a closed path of a hand that feels three forces gives no work, in either sense", "[undriven][servo]") {
+TEST_CASE("a closed path of a hand that feels three forces gives no work, in either sense",
+          "[undriven][servo]") {
   for (const double sense : {1.0, -1.0}) {
     INFO("sense " << sense);
     const Result r = go_round(sense);
