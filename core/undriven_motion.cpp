@@ -194,9 +194,13 @@ bool UndrivenMotion::accept(const Pose& X_BH, const SpringState& from, const Spr
   return true;
 }
 
+/// Credit of one contact does not serve the next. What is held back for changes of force that have not acted
+/// yet is lost too; when all have acted, the account starts again.
 void UndrivenMotion::finish(const SpringState& at) noexcept {
   if (wait_ > 0) --wait_;
-  if (at.known && at.U_J == 0.0 && pending_count_ == 0) account_J_ = kInitialAccount_J;
+  if (!at.known || at.U_J != 0.0) return;
+  account_J_ = pending_count_ == 0 ? kInitialAccount_J : std::min(account_J_, kInitialAccount_J);
+  for (std::size_t i = 0; i < pending_count_; ++i) pending_[i].reserve_J = 0.0;
 }
 
 }  // namespace wrenchd

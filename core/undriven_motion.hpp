@@ -57,7 +57,9 @@ class UndrivenMotion {
         at = there;
         break;
       }
+      const SpringState before = at;
       at = render(X_BH_used_);
+      account_J_ -= share_ * (at.U_J - before.U_J);  // the proxy may return to another place
       if (!whole_) break;
     }
     finish(at);

@@ -294,10 +294,18 @@ class Host {
     if (options_.guarded) F = guard_.limit(F_, report.X_BH, dt_s, in_contact_);
     const Wrench out = limits_.apply({F, 1.0, circumstances_.period_s, {}, Vector3d::Zero()}).F;
     if (options_.guarded) guard_.record_sent(out);
+    undriven_.set_share(share_of(out, F_));
     return out;
   }
 
  private:
+  /// Share of the requested wrench that the limits let pass, as the daemon's output stage computes it.
+  static double share_of(const Wrench& sent, const Wrench& requested) {
+    const auto ratio = [](const Vector3d& part, const Vector3d& whole) {
+      return whole.isZero(0.0) ? 1.0 : std::min(1.0, part.norm() / whole.norm());
+    };
+    return std::min(ratio(sent.force_N, requested.force_N), ratio(sent.torque_Nm, requested.torque_Nm));
+  }
   SpringState render(const Pose& X_WH, double dt_s) {
     const Pose X_WP = X_WH * circumstances_.X_HT;
     const Penetration depth = depth_.follow(X_WP, X_WQ_);
