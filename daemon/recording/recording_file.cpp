@@ -18,7 +18,7 @@ namespace wrenchd {
 namespace {
 
 /// Version of the columns and their meaning. A reader of another version rejects the file.
-constexpr const char* kFormat = "8";
+constexpr const char* kFormat = "9";
 constexpr hsize_t kChunkContacts = 1024;
 constexpr unsigned kDeflateLevel = 1;
 /// Largest expansion of DEFLATE. A table that claims more rows than its file can hold is damaged.

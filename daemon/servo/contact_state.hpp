@@ -13,7 +13,7 @@ namespace wrenchd {
 /// Where the hand commands the tool, and where the world lets it be. Frames: W world, B device base, H handle
 /// point, P commanded pose of the tool body (the paper's p), Q its proxy (the paper's q).
 struct ContactState {
-  Pose X_WH;
+  Pose X_WH;  ///< Handle pose of the rendering: without the undriven motion that passivity forbids.
   Pose X_WP;
   Pose X_WQ;  ///< Meaningless unless proxy_valid.
   bool proxy_valid =
@@ -27,7 +27,9 @@ struct ContactState {
   ProjectionStatus status = ProjectionStatus::free;
   std::optional<Pose>
       X_BH_held;  ///< Pose at which the world holds the handle, in B; empty if it is not known.
-  std::uint32_t rendering_id = 0;  ///< Rendering that all of this is of.
+  double undriven_lag_rad = 0.0;    ///< Rotation of the handle that X_WH does not contain.
+  double undriven_account_J = 0.0;  ///< Energy that undriven motion of the handle may still use.
+  std::uint32_t rendering_id = 0;   ///< Rendering that all of this is of.
   std::uint64_t rendering_checksum = 0;
   bool crossfading = false;  ///< Another rendering is replacing this one.
 

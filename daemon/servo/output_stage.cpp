@@ -1,9 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/servo/output_stage.hpp"
 
+#include <algorithm>
+
 #include "core/finite.hpp"
 
 namespace wrenchd {
+namespace {
+
+/// Ratio of the sent force to the requested one, or of the torques if that is less, 0 to 1. Without a
+/// request, returns `otherwise`.
+double share_of(const Wrench& sent, const Wrench& requested, double otherwise) noexcept {
+  double share = 1.0;
+  bool any = false;
+  const auto include = [&](const Vector3d& part, const Vector3d& whole) {
+    if (!(whole.squaredNorm() > 0.0)) return;
+    any = true;
+    share = std::min(share, part.norm() / whole.norm());
+  };
+  include(sent.force_N, requested.force_N);
+  include(sent.torque_Nm, requested.torque_Nm);
+  return any ? share : std::clamp(otherwise, 0.0, 1.0);
+}
+
+}  // namespace
 
 OutputStage::OutputStage(const LimitSettings& settings, const DeviceProfile& profile,
                          const PassivityGuard& guard)
@@ -45,8 +65,10 @@ Limited OutputStage::limit(const Stabilized& contact, const Demand& demand, cons
   if (contact.intervened) out.causes |= kPassivity;
   if ((out.causes & kNotFinite) != 0) limits_.reset();
   heat_.advance(out.F, t.dt_s);
-  if (authority.send)
-    stabilizer_.record_sent(authority.motors_on ? out.F - authority.scale * demand.F_weight : Wrench{});
+  const Wrench F_contact = out.F - authority.scale * demand.F_weight;
+  const bool motors_on = authority.send && authority.motors_on;
+  contact_share_ = motors_on ? share_of(F_contact, demand.F_contact, authority.scale) : 0.0;
+  if (authority.send) stabilizer_.record_sent(authority.motors_on ? F_contact : Wrench{});
   return out;
 }
 

@@ -43,6 +43,8 @@ class OutputStage {
   RenderingCrossfade::FadeLimits fade_limits() const noexcept {
     return {max_force_N(), max_torque_Nm(), settings_.soft_start_s};
   }
+  /// Share of the contact wrench of the last tick that was sent, 0 to 1; 0 while the motors are off.
+  double contact_share() const noexcept { return contact_share_; }
   const ContactStabilizer& stabilizer() const noexcept { return stabilizer_; }
 
  private:
@@ -51,6 +53,7 @@ class OutputStage {
   WrenchLimits limits_;
   ThermalModel heat_;
   ContactStabilizer stabilizer_;
+  double contact_share_ = 0.0;          ///< Sent contact wrench over the requested one, in the last tick.
   Twist V_BH_;                          ///< Last finite twist of the handle.
   Vector3d p_BH_m_ = Vector3d::Zero();  ///< Last finite position of the handle point.
 };

@@ -13,6 +13,11 @@ namespace {
 constexpr double kContactFadeOut_s = 0.050;
 constexpr double kContactFadeIn_s = 0.100;
 
+/// A device whose wrench is about another point gets the wrench of its measured pose.
+DofMask sensed_at_handle(const DeviceProfile& profile) noexcept {
+  return profile.wrench_point == WrenchPoint::handle ? sensed_dofs(profile) : kNoDof;
+}
+
 }  // namespace
 
 Renderer::Renderer(const Settings& settings, const DeviceProfile& profile,
@@ -24,7 +29,8 @@ Renderer::Renderer(const Settings& settings, const DeviceProfile& profile,
       crossfade_(std::move(rendering), exchange),
       workspace_(settings.device.base_in_world.pose()),
       gravity_(profile.masses, settings.device.base_in_world.pose().rotation),
-      stability_(settings, profile, active().stability()) {
+      stability_(settings, profile, active().stability()),
+      undriven_(sensed_at_handle(profile), driven_, stated_encoder_step(profile)) {
   invalidate_proxy({});
 }
 
@@ -102,6 +108,7 @@ void Renderer::invalidate_proxy(TimePoint now) noexcept {
   demand_.F_contact = demand_.F_weight = Wrench{};
   demand_.undriven = kNoDof;
   demand_.proxy_invalidated = true;
+  undriven_.reset();
 }
 
 void Renderer::adopt_rendering(TimePoint now) noexcept {
@@ -115,6 +122,7 @@ void Renderer::scale_renderings() noexcept {
   crossfade_.active().set_stiffness_scale(stability_.scale());
   if (Rendering* next = crossfade_.next())
     next->set_stiffness_scale(stability_.max_stable_scale(next->stability()));
+  undriven_.set_loop(stability_.stiffness_at_handle(), stability_.longest_lag_s());
 }
 
 PassivityGuard Renderer::derive_stiffness(const TickTime& t) noexcept {
@@ -125,17 +133,49 @@ PassivityGuard Renderer::derive_stiffness(const TickTime& t) noexcept {
   return stability_.make_guard();
 }
 
-ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdict,
+ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdict, double sent_share,
                                const TickTime& t) noexcept {
-  if (verdict.sample_usable) {
-    const Pose X_WH = workspace_.update(sample.X_BH, t.dt_s);
-    if (stability_.set_workspace_scale(workspace_.scale())) scale_renderings();
-    if (!crossfade_.project(X_WH, t.now, t.scene_time_s)) {  // trapped between moving obstacles
-      invalidate_proxy(t.now);
-      demand_.interrupted = true;
-    }
+  if (verdict.sample_usable && !follow_driven(sample, sent_share, t)) {  // trapped between moving obstacles
+    invalidate_proxy(t.now);
+    demand_.interrupted = true;
   }
   return contact();
+}
+
+/// Moves the renderings to the sample's pose. On a device that senses motion which no motor drives, they
+/// follow that motion only as far as they stay passive: core/METHOD.md, section 11.5. Returns false if moving
+/// obstacles trap a proxy.
+bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept {
+  bool first = true, kept = true;
+  const auto move = [&](const Pose& X_BH) {
+    const Pose X_WH = workspace_.update(X_BH, first ? t.dt_s : 0.0);
+    if (first && stability_.set_workspace_scale(workspace_.scale())) scale_renderings();
+    kept = (first ? crossfade_.project(X_WH, t.now, t.scene_time_s) : crossfade_.move(X_WH)) && kept;
+    first = false;
+  };
+  const bool held = active().proxy_initialization() == ProxyInitialization::complete;
+  if (!undriven_.active() || !held) {
+    undriven_.reset();
+    move(sample.X_BH);
+    return kept;
+  }
+  undriven_.set_share(contact_gain_ * sent_share);
+  undriven_.follow(sample.X_BH, sample.device_time_s, [&](const Pose& X_BH) {
+    move(X_BH);
+    return spring_state();
+  });
+  return kept;
+}
+
+/// While two renderings fade, and while a proxy lags, the potential is not known, and undriven motion waits.
+SpringState Renderer::spring_state() const noexcept {
+  const Rendering& rendering = active();
+  SpringState state;
+  state.known =
+      crossfade_.next() == nullptr && rendering.depth().projection.status != ProjectionStatus::budget_spent;
+  state.U_J = rendering.spring_potential_J();
+  state.F_B = on_hand(rendering, rendering.spring_F_T());
+  return state;
 }
 
 ContactState Renderer::contact() const noexcept {
@@ -154,6 +194,8 @@ ContactState Renderer::contact() const noexcept {
   c.iterations = depth.projection.iterations;
   c.status = depth.projection.status;
   c.X_BH_held = held_pose();
+  c.undriven_lag_rad = undriven_.lag_rad();
+  c.undriven_account_J = undriven_.account_J();
   c.rendering_id = rendering.id();
   c.rendering_checksum = rendering.checksum();
   c.crossfading = crossfade_.next() != nullptr;
@@ -218,8 +260,11 @@ bool Renderer::compute_demand(const DeviceSample& sample, const RenderingCrossfa
 /// says.
 Wrench Renderer::contact_wrench(const Rendering& rendering) const noexcept {
   if (wrench_point_ == WrenchPoint::world_origin) return spatial_wrench(rendering.X_WP(), rendering.F_T());
-  const Wrench F_H_W = wrench_about(workspace_.X_WH().translation_m, rendering.X_WP(), rendering.F_T());
-  return workspace_.wrench_on_hand(F_H_W);
+  return on_hand(rendering, rendering.F_T());
+}
+
+Wrench Renderer::on_hand(const Rendering& rendering, const Wrench& F_T) const noexcept {
+  return workspace_.wrench_on_hand(wrench_about(workspace_.X_WH().translation_m, rendering.X_WP(), F_T));
 }
 
 Wrench Renderer::local_model_wrench(const DeviceSample& sample, const TickTime& t) noexcept {
@@ -257,6 +302,7 @@ bool Renderer::is_calm(const DeviceSample& sample,
 
 void Renderer::forget_device() noexcept {
   crossfade_.reset_law();
+  undriven_.reset();
   has_sample_time_ = false;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/gravity_compensation.hpp"
+#include "core/undriven_motion.hpp"
 #include "daemon/servo/demand.hpp"
 #include "daemon/servo/device_port.hpp"
 #include "daemon/servo/event.hpp"
@@ -42,8 +43,9 @@ class Renderer {
   PassivityGuard derive_stiffness(const TickTime& t) noexcept;
 
   /// p from the sample, and its projection q, which follows p from the previous tick's as a proxy. Without a
-  /// usable sample the contact stays as it was.
-  ContactState project(const DeviceSample& sample, const Verdict& verdict, const TickTime& t) noexcept;
+  /// usable sample the contact stays as it was. sent_share: share of the last contact wrench that was sent.
+  ContactState project(const DeviceSample& sample, const Verdict& verdict, double sent_share,
+                       const TickTime& t) noexcept;
   /// The wrench of the contact, Eq. (16) or the energy law, as the device takes it.
   Demand compute_wrench(const ContactState& contact, const DeviceSample& sample, const Verdict& verdict,
                         const RenderingCrossfade::FadeLimits& limits, const TickTime& t) noexcept;
@@ -63,6 +65,9 @@ class Renderer {
   PassivityGuard make_guard() const noexcept { return stability_.make_guard(); }
 
  private:
+  bool follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept;
+  SpringState spring_state() const noexcept;
+  Wrench on_hand(const Rendering& rendering, const Wrench& F_T) const noexcept;
   void change_rendering(bool driving, const TickTime& t) noexcept;
   void change_workspace(const WorkspaceRequest& request) noexcept;
   void handle_buttons(std::uint32_t buttons, TimePoint now) noexcept;
@@ -90,6 +95,7 @@ class Renderer {
   double local_model_scale_ = 1.0;  ///< Share of the stiffness of the local models that stays passive.
   GravityCompensation gravity_;
   StabilityMonitor stability_;
+  UndrivenMotion undriven_;
 
   double contact_gain_ = 1.0;   ///< Share of the contact wrench that goes out.
   bool contact_muted_ = false;  ///< True while the contact gain ramps down to 0; otherwise it ramps up to 1.

@@ -99,6 +99,32 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
   return true;
 }
 
+bool Rendering::move(const Pose& X_WH) noexcept {
+  X_WP_ = X_WH * X_HT_;
+  if (proxy_initialization_ != ProxyInitialization::complete) return true;
+  depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
+  if (scene_->has_moving_obstacles() && depth_.projection.status == ProjectionStatus::infeasible)
+    return false;
+  X_WQ_ = depth_.projection.X_WQ;
+  return true;
+}
+
+Wrench Rendering::spring_F_T() const noexcept {
+  if (!in_contact()) return {};
+  if (spring_law_ == SpringLaw::energy)
+    return energy_wrench(M_, spring_scale_ * energy_stiffness_per_s2_, X_WP_, X_WQ_);
+  const Vector6d F = spring_scale_ * (gains_.stiffness * depth_.spring_displacement);
+  return {F.head<3>(), F.tail<3>()};
+}
+
+double Rendering::spring_potential_J() const noexcept {
+  if (!in_contact()) return 0.0;
+  if (spring_law_ == SpringLaw::energy)
+    return 0.5 * spring_scale_ * energy_stiffness_per_s2_ * depth_.projection.energy;
+  const Vector6d& eps = depth_.spring_displacement;
+  return 0.5 * spring_scale_ * eps.dot(gains_.stiffness * eps);
+}
+
 /// Sends a request, or takes its result in a later tick. The result is near the hand pose at the time of the
 /// request. It becomes q of this tick, and the next tick follows from it. The proxy then also makes up for
 /// the obstacle motion since the request.

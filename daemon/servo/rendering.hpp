@@ -37,6 +37,9 @@ class Rendering {
   /// exists, requests or takes a proxy initialization instead. Returns false if moving obstacles trap the
   /// proxy; the caller must then call invalidate_proxy(). RT-safe.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
+  /// Moves p of this tick to another handle pose, and q after it; the obstacles stay as in the last
+  /// project(). Returns false if no admissible pose is left. Does nothing without a valid proxy. RT-safe.
+  bool move(const Pose& X_WH) noexcept;
   /// Computes the body wrench for the poses of the last project(). dt_s: device time since the last call.
   /// RT-safe.
   void compute_wrench(double dt_s) noexcept;
@@ -66,6 +69,10 @@ class Rendering {
   /// Returns the contacts that hold the proxy, at most kMaxTouches. RT-safe.
   Touches contacts() const noexcept;
   const Wrench& F_T() const noexcept { return F_T_; }  ///< Body wrench in axes of T at its origin. RT-safe.
+  /// Returns the wrench of the spring alone at the poses of the last project() or move(), in axes of T at its
+  /// origin, and its potential, METHOD (63): for the PID law 1/2 eps' K eps. RT-safe.
+  Wrench spring_F_T() const noexcept;
+  double spring_potential_J() const noexcept;
   /// Returns the energy stored in the spring [J], METHOD (68). RT-safe.
   double stored_energy_J() const noexcept;
   /// Returns the work of moving obstacles on the spring in this tick [J], METHOD (69). It is negative if the
@@ -98,7 +105,7 @@ class Rendering {
   PenetrationDepth penetration_;
   WrenchLaw law_;
   LagLimiter lag_limiter_;
-  double spring_scale_ = 1.0;
+  double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.
 
   ProxyInitialization proxy_initialization_ = ProxyInitialization::searching;
   Pose X_WQ_;

@@ -33,6 +33,11 @@ bool RenderingCrossfade::project(const Pose& X_WH, TimePoint now, double scene_t
   return (!next_ || next_->project(X_WH, now, scene_time_s)) && kept;
 }
 
+bool RenderingCrossfade::move(const Pose& X_WH) noexcept {
+  const bool kept = active_->move(X_WH);
+  return (!next_ || next_->move(X_WH)) && kept;
+}
+
 void RenderingCrossfade::compute_wrench(double dt_s) noexcept {
   active_->compute_wrench(dt_s);
   if (next_) next_->compute_wrench(dt_s);

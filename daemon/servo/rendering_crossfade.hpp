@@ -46,6 +46,8 @@ class RenderingCrossfade {
 
   /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
+  /// Moves p of this tick to another handle pose in both renderings. Returns false if a proxy is trapped.
+  bool move(const Pose& X_WH) noexcept;
   /// Calls Rendering::compute_wrench() for both renderings.
   void compute_wrench(double dt_s) noexcept;
 

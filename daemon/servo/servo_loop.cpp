@@ -45,7 +45,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   if (asked.limits) change_limits(*asked.limits, v.armed());
   if (v.release) return leave(t, asked, in, Written{}, {});
 
-  const ContactState c = renderer_.project(s, v, t);  // p, its proxy q, eps
+  const ContactState c = renderer_.project(s, v, output_.contact_share(), t);  // p, its proxy q, eps
   clock_.lap(Stage::projection);
 
   const Demand d = renderer_.compute_wrench(c, s, v, output_.fade_limits(), t);  // Eq. (16) or the energy law

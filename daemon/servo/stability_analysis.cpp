@@ -28,18 +28,17 @@ DeviceDamping stated_damping(const DeviceProfile& profile) {
   return {profile.damping_N_s_per_m, profile.damping_Nm_s_per_rad};
 }
 
-/// A step that the profile does not state counts as 0.
-EncoderStep stated_encoder_step(const DeviceProfile& profile) {
-  const auto stated_or_zero = [](double step) { return is_finite(step) ? step : 0.0; };
-  return {stated_or_zero(profile.encoder_step_m), stated_or_zero(profile.encoder_step_rad)};
-}
-
 /// Factor by which a damper on the velocity along these degrees of freedom counts.
 double velocity_gain(const DeviceProfile& profile, DofMask dofs) {
   return (estimated_velocity_dofs(profile) & dofs) != 0 ? kEstimateGain : 1.0;
 }
 
 }  // namespace
+
+EncoderStep stated_encoder_step(const DeviceProfile& profile) noexcept {
+  const auto stated_or_zero = [](double step) { return is_finite(step) ? step : 0.0; };
+  return {stated_or_zero(profile.encoder_step_m), stated_or_zero(profile.encoder_step_rad)};
+}
 
 StabilityAnalysis::StabilityAnalysis(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
                                      const Pose& X_HT)
@@ -101,6 +100,17 @@ double StabilityAnalysis::max_stable_scale_at_handle(const LoopMeasurement& meas
                                 linear_velocity_gain_),
                   passive_scale(damping_.angular_Nm_s_per_rad, gains.stiffness_Nm_per_rad,
                                 gains.damping_Nm_s_per_rad, angular_velocity_gain_));
+}
+
+Matrix6d StabilityAnalysis::stiffness_at_handle(double spring_scale, double workspace_scale) const noexcept {
+  Matrix6d K = spring_scale * transform_to_handle(coupling_.stiffness, X_HT_);
+  K.topRows<3>() *= workspace_scale;
+  K.leftCols<3>() *= workspace_scale;
+  return K;
+}
+
+double StabilityAnalysis::longest_lag_s(const LoopMeasurement& measured) const noexcept {
+  return std::max(measured.longest_period_s(), period_s_) + measured.delay_s();
 }
 
 PassivityGuard StabilityAnalysis::make_passivity_guard(const LoopMeasurement& measured) const noexcept {

@@ -17,6 +17,10 @@ struct StiffnessScale {
   bool bound_known = false;  ///< True if the profile states the damping that the bound needs.
 };
 
+/// Returns the resolution of the profile's encoders; a step that the profile does not state counts as 0.
+/// RT-safe.
+EncoderStep stated_encoder_step(const DeviceProfile& profile) noexcept;
+
 /// Computes how much stiffness stays passive with the measured rate and delay of the loop, and with the
 /// maximum stiffness of the profile. core/METHOD.md, section 10.
 class StabilityAnalysis {
@@ -37,6 +41,12 @@ class StabilityAnalysis {
   /// damping. RT-safe.
   double max_stable_scale_at_handle(const LoopMeasurement& measured,
                                     const LocalModels::TotalGains& gains) const noexcept;
+
+  /// Returns the linearised spring at the handle, in axes of H, with `spring_scale` on the configured
+  /// stiffness, METHOD (79), (82a). RT-safe.
+  Matrix6d stiffness_at_handle(double spring_scale, double workspace_scale) const noexcept;
+  /// Returns the longest time from a sample to the end of the tick in which its wrench acts [s]. RT-safe.
+  double longest_lag_s(const LoopMeasurement& measured) const noexcept;
 
   /// Returns a passivity guard for this device and the measured delay. RT-safe.
   PassivityGuard make_passivity_guard(const LoopMeasurement& measured) const noexcept;

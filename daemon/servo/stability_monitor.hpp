@@ -37,6 +37,12 @@ class StabilityMonitor {
   /// The guard for the device and delay of the last derive().
   PassivityGuard make_guard() const noexcept { return analysis_.make_passivity_guard(derivation_); }
 
+  /// The spring at the handle in axes of H, with scale(), and the longest lag of its wrench [s].
+  Matrix6d stiffness_at_handle() const noexcept {
+    return analysis_.stiffness_at_handle(scale_.spring, workspace_scale_);
+  }
+  double longest_lag_s() const noexcept { return analysis_.longest_lag_s(derivation_); }
+
   /// Another rendering is active from now on.
   void set_analysis(const StabilityAnalysis& analysis) noexcept;
   /// Metres that the tool moves for a metre of the handle. Returns true if it changed; then scale() changed

@@ -53,6 +53,8 @@ void record_contact(const ContactState& contact, TickRecord& record) noexcept {
   record.iterations = contact.iterations;
   record.projection_status = static_cast<std::uint8_t>(contact.status);
   record.proxy_initialization = static_cast<std::uint8_t>(contact.initialization);
+  record.undriven_lag_rad = contact.undriven_lag_rad;
+  record.undriven_account_J = contact.undriven_account_J;
   record.rendering_id = contact.rendering_id;
   record.rendering_checksum = contact.rendering_checksum;
 }

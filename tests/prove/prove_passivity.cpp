@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <deque>
+#include <map>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +22,7 @@
 #include "core/loop_measurement.hpp"
 #include "core/passivity.hpp"
 #include "core/stability_bound.hpp"
+#include "core/undriven_motion.hpp"
 #include "core/wrench_law.hpp"
 #include "devices/simulation/hand_path.hpp"
 #include "devices/simulation/simulated_handle.hpp"
@@ -29,6 +32,9 @@
 // encoder values: in each substep it adds the work of the motors on the handle and subtracts the energy that
 // the device's own viscous friction dissipates. Trajectories start at the surface, so that free motion
 // contributes no credit.
+//
+// --senses and --drives take a device that senses more axes than it drives. Of its friction only that of the
+// driven axes counts, and a third of the hand's motions are closed paths, in both senses.
 //
 // Each trajectory draws its own hand, delays, jitter, losses and encoder resolution. The loop first measures
 // itself as the daemon does. The stiffness is a fraction of the resulting stability bound.
@@ -60,7 +66,9 @@ struct Options {
   bool pid = false;
   std::vector<double> friction;  ///< viscous friction of the device [N.s/m, N.m.s/rad]; empty: as shipped
   double work_share = 1.0;       ///< work limit of the proxy as a fraction of the daemon's
-  double angular_share = 1.0;    ///< only for law pid: angular stiffness relative to the metric's
+  DofMask senses = kAllDofs, drives = kAllDofs;
+  bool measured_rotation = false;  ///< renders undriven motion as measured: without the energy account
+  double angular_share = 1.0;      ///< only for law pid: angular stiffness relative to the metric's
 };
 
 /// Returns the work limit for --work-share. Small meshes reach the limit of sweeps only.
@@ -120,8 +128,26 @@ struct HandWay {
   }
 };
 
-/// X_WH: start of the hand, in contact with the surface below; z points up.
-HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
+/// A closed path of position and rotation that starts and ends at the same pose, one to four times round.
+template <class Go>
+void go_round(RandomValues& random, Vector3d& p, Vector3d& turn, const Go& go) {
+  constexpr int kPoints = 24;
+  const Vector3d centre = p, turn_centre = turn;
+  const Vector3d linear(random.uniform(0.0, 0.002), random.uniform(0.0, 0.002), random.uniform(0.001, 0.004));
+  const Vector3d angular = random.vector<3>(0.3);
+  const double phase = random.uniform(0.0, 2.0 * std::numbers::pi), sense = random.chance(0.5) ? 1.0 : -1.0;
+  const double period_s = random.log_uniform(0.15, 1.0);
+  const int rounds = static_cast<int>(random.integer(1, 4));
+  for (int i = 1; i <= rounds * kPoints; ++i) {
+    const double angle = sense * 2.0 * std::numbers::pi * i / kPoints;
+    p = centre - linear * (1.0 - std::cos(angle));
+    turn = turn_centre + angular * (std::sin(angle + phase) - std::sin(phase));
+    go(period_s / kPoints);
+  }
+}
+
+/// X_WH: start of the hand, in contact with the surface below; z points up. closed: with closed paths.
+HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds, bool closed) {
   HandWay way;
   const double touching_m = X_WH.translation_m.z();
   Vector3d p = X_WH.translation_m, turn = rotation_vector(X_WH.rotation);
@@ -129,6 +155,10 @@ HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
   const auto go = [&](double in_s) { way.goals.push_back({t += in_s, p, turn}); };
   go(0.0);
   while (t < seconds) {
+    if (closed && random.chance(1.0 / 3.0)) {
+      go_round(random, p, turn, go);
+      continue;
+    }
     switch (random.integer(0, 3)) {
       case 0:  // push and hold
         p.z() = touching_m - random.uniform(0.0, 0.02);
@@ -209,9 +239,12 @@ class Host {
         law_(WrenchGains{}),
         limits_(LimitSettings{}, limits_of_the_device()),
         guard_({}, {}),
+        undriven_(options.measured_rotation ? kNoDof : options.senses, options.drives,
+                  {c.position_quantum_m, c.rotation_quantum_rad}),
         X_WQ_(X_WP_start) {}
 
   LoopMeasurement& measured() { return measured_; }
+  bool in_contact() const { return in_contact_; }
 
   /// Sets the stiffness that the bound allows for the measured loop. Returns the translational stiffness
   /// [N/m].
@@ -227,13 +260,16 @@ class Host {
     coupling.stiffness = energy_stiffness(M_, kStiff_per_s2);
     coupling.stiffness.bottomRightCorner<3, 3>() *= options_.pid ? options_.angular_share : 1.0;
     coupling.damping = d / (1.0 - d) * (0.5 * loop.period_s + loop.delay_s) * coupling.stiffness;
-    const double scale = circumstances_.share *
-                         stability_bound(device, loop, coupling, circumstances_.X_HT, kAllDofs, step).scale;
+    const double scale =
+        circumstances_.share *
+        stability_bound(device, loop, coupling, circumstances_.X_HT, options_.drives, step).scale;
     stiffness_per_s2_ = scale * kStiff_per_s2;
     WrenchGains gains;
     gains.stiffness = scale * coupling.stiffness;
     gains.damping = scale * coupling.damping;
     law_ = WrenchLaw(gains);
+    undriven_.set_loop(transform_to_handle(gains.stiffness, circumstances_.X_HT),
+                       loop.period_s + loop.delay_s);
     PassivityLimits caps;
     caps.delay_ticks =
         static_cast<std::size_t>(std::lround(measured_.typical_delay_s() / measured_.period_s().mean_s()));
@@ -246,17 +282,31 @@ class Host {
     if (fresh) {
       device_s_ = report.device_s;
       sampled_ = true;
-      render(report.X_BH, dt_s);
+      bool moved = false;
+      undriven_.follow(report.X_BH, report.device_s, [&](const Pose& X_WH) {
+        const SpringState spring = render(X_WH, moved ? 0.0 : dt_s);
+        moved = true;
+        return spring;
+      });
+      F_ = restrict_to_dofs(F_, options_.drives);
     }
     Wrench F = F_;
     if (options_.guarded) F = guard_.limit(F_, report.X_BH, dt_s, in_contact_);
     const Wrench out = limits_.apply({F, 1.0, circumstances_.period_s, {}, Vector3d::Zero()}).F;
     if (options_.guarded) guard_.record_sent(out);
+    undriven_.set_share(share_of(out, F_));
     return out;
   }
 
  private:
-  void render(const Pose& X_WH, double dt_s) {
+  /// Share of the requested wrench that the limits let pass, as the daemon's output stage computes it.
+  static double share_of(const Wrench& sent, const Wrench& requested) {
+    const auto ratio = [](const Vector3d& part, const Vector3d& whole) {
+      return whole.isZero(0.0) ? 1.0 : std::min(1.0, part.norm() / whole.norm());
+    };
+    return std::min(ratio(sent.force_N, requested.force_N), ratio(sent.torque_Nm, requested.torque_Nm));
+  }
+  SpringState render(const Pose& X_WH, double dt_s) {
     const Pose X_WP = X_WH * circumstances_.X_HT;
     const Penetration depth = depth_.follow(X_WP, X_WQ_);
     X_WQ_ = depth.projection.X_WQ;
@@ -268,6 +318,12 @@ class Host {
                                             depth.projection.status == ProjectionStatus::budget_spent);
     F_T = {scale * F_T.force_N, scale * F_T.torque_Nm};
     F_ = wrench_about(X_WH.translation_m, X_WP, F_T);
+    SpringState spring;
+    spring.known = depth.projection.status != ProjectionStatus::budget_spent;
+    if (!in_contact_) return spring;
+    spring.U_J = 0.5 * stiffness_per_s2_ * depth.projection.energy;
+    spring.F_B = wrench_about(X_WH.translation_m, X_WP, energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_));
+    return spring;
   }
 
   PenetrationDepth depth_;
@@ -279,6 +335,7 @@ class Host {
   LagLimiter lag_limiter_;
   WrenchLimits limits_;
   PassivityGuard guard_;
+  UndrivenMotion undriven_;
   double stiffness_per_s2_ = 0.0;
   Pose X_WQ_;
   Wrench F_;
@@ -291,8 +348,7 @@ class Host {
 /// restarts at 0 while there is neither contact nor motor force.
 class Ledger {
  public:
-  void add(const SimulatedEnergy& energy, bool at_rest) {
-    const double net_J = energy.motors_J - energy.friction_J;
+  void add(double net_J, bool at_rest) {
     worst_J_ = std::max({worst_J_, net_J, net_J - start_J_});
     if (at_rest) start_J_ = net_J;
   }
@@ -313,10 +369,11 @@ class Run {
       const Options& options)
       : random_(random),
         c_(c),
+        options_(options),
         seconds_(options.seconds),
         step_s_(c.period_s / kSubsteps),
         X_WH_(X_WT * inverse(c.X_HT)),
-        way_(hand_way(random, X_WH_, options.seconds)),
+        way_(hand_way(random, X_WH_, options.seconds, partly_driven())),
         path_(way_.goals, false),
         handle_(c.hand, X_WH_, step_s_),
         host_(scene, c, options, X_WT),
@@ -345,9 +402,7 @@ class Run {
     double arrived_s = 0.0;
     if (commands_.receive(now_s, command_, arrived_s) && settled_) motors_ = command_.F;
     if (substep % kSubsteps == 0) {
-      const Pose seen = {
-          rotation_from(rounded(rotation_vector(handle_.X_BH().rotation), c_.rotation_quantum_rad)),
-          rounded(handle_.X_BH().translation_m, c_.position_quantum_m)};
+      const Pose seen = sensed();
       reports_.send(now_s, {seen, now_s, ++sequence_, command_.number}, random_);
     }
     if (now_s + 1e-12 >= next_tick_s_) tick(now_s);
@@ -372,7 +427,26 @@ class Run {
     if (!way_.holds(t_s)) goal = {handle_.X_BH(), handle_.V_BH()};
     handle_.step(goal, motors_);
     const bool off = motors_.force_N.isZero(0.0) && motors_.torque_Nm.isZero(0.0);
-    ledger_.add(handle_.energy(), count_energy && off && free());
+    if (partly_driven()) {
+      driven_friction_J_ += driven_friction_W() * step_s_;
+      ledger_.add(handle_.energy().motors_J - driven_friction_J_, count_energy && off && !host_.in_contact());
+      return;
+    }
+    ledger_.add(handle_.energy().motors_J - handle_.energy().friction_J, count_energy && off && free());
+  }
+  bool partly_driven() const { return (options_.senses & options_.drives) != kAllDofs; }
+  /// What the encoders report: the start rotation if the device senses none.
+  Pose sensed() const {
+    Pose X = {X_WH_.rotation, rounded(handle_.X_BH().translation_m, c_.position_quantum_m)};
+    if ((options_.senses & kAngularDofs) != 0)
+      X.rotation = rotation_from(rounded(rotation_vector(handle_.X_BH().rotation), c_.rotation_quantum_rad));
+    return X;
+  }
+  double driven_friction_W() const {
+    const Twist& V = handle_.V_BH();
+    const Wrench v = restrict_to_dofs({V.linear_m_per_s, V.angular_rad_per_s}, options_.drives);
+    return c_.hand.viscous_friction_N_s_per_m * v.force_N.squaredNorm() +
+           c_.hand.viscous_friction_Nm_s_per_rad * v.torque_Nm.squaredNorm();
   }
   /// Uses the true pose, not the encoder values.
   bool free() {
@@ -383,6 +457,8 @@ class Run {
 
   RandomValues& random_;
   const Circumstances& c_;
+  const Options& options_;
+  double driven_friction_J_ = 0.0;
   double seconds_, step_s_;
   Pose X_WH_;
   HandWay way_;
@@ -471,6 +547,14 @@ int main(int argc, char** argv) {
                  "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
+  const std::map<std::string, DofMask> axes = {
+      {"6", kAllDofs}, {"5", kAllDofs & ~0b100'000}, {"3", kLinearDofs}};
+  app.add_option("--senses", options.senses, "axes that the device senses: 6, or 3 translations")
+      ->transform(CLI::CheckedTransformer(axes));
+  app.add_option("--drives", options.drives, "axes that it drives: 6, 5 (no torque about z), or 3 forces")
+      ->transform(CLI::CheckedTransformer(axes));
+  app.add_flag("--measured-rotation", options.measured_rotation,
+               "renders undriven motion as measured, to show what the energy account prevents");
   app.add_flag("--tell", tell, "prints the parameters of each violation");
   CLI11_PARSE(app, argc, argv);
 

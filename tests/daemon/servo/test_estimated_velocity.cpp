@@ -12,68 +12,28 @@
 
 #include "core/limits.hpp"
 #include "core/state_machine.hpp"
-#include "daemon/runtime.hpp"
-#include "daemon/servo/servo_loop.hpp"
 #include "daemon/servo/stability_analysis.hpp"
-#include "devices/links/simulated_link.hpp"
 #include "devices/velocity_estimator.hpp"
+#include "tests/support/emulated_run.hpp"
 
 namespace wrenchd {
 namespace {
 
-constexpr double kPeriod_s = 1e-3;
+using test::EmulatedRun;
+
+constexpr double kPeriod_s = EmulatedRun::kPeriod_s;
 
 /// Position of the handle over time. The shipped cube touches the shipped table at a height of 25 mm.
 using HandMotion = std::function<Vector3d(double t_s)>;
 
 RunConfig config_for(const std::string& profile, const HandMotion& motion, double duration_s) {
-  RunConfig config = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, profile, true},
-                                     SearchPath({WRENCHD_SOURCE_DIR "/config"}));
-  config.settings.servo.self_test_s = 0.0;
-  SimulationSettings& simulation = config.settings.simulation;
-  simulation.playback_path.clear();
-  for (double t_s = 0.0; t_s <= duration_s; t_s += 0.002)
-    simulation.playback_path.push_back({t_s, {Quaterniond::Identity(), motion(t_s)}});
-  simulation.playback_mode = PlaybackMode::open;  // no force changes the motion
-  return config;
+  return test::prescribed_motion(
+      profile,
+      [&](double t_s) {
+        return Pose{Quaterniond::Identity(), motion(t_s)};
+      },
+      duration_s);
 }
-
-/// A servo loop with an emulated device whose handle moves as prescribed, in virtual time.
-struct EmulatedRun {
-  explicit EmulatedRun(const RunConfig& config)
-      : link(make_simulated_link(config.profile, config.settings.simulation, clock)),
-        runtime(config, *link, clock, ProxySearchMode::in_tick) {
-    runtime.open();
-  }
-  void tick() {
-    const Vector3d before_m = link->device().X_BH().translation_m;
-    clock.sleep_until(clock.now() + from_seconds(kPeriod_s));
-    runtime.loop().tick(clock.now(), clock.now());
-    runtime.loop().telemetry().latest_record().read(record);
-    true_velocity_m_per_s = (link->device().X_BH().translation_m - before_m) / kPeriod_s;
-  }
-  void run_until(
-      double t_s, const std::function<void()>& each = [] {}) {
-    while (seconds(clock.now().time_since_epoch()) < t_s) {
-      tick();
-      each();
-    }
-  }
-  void arm() { runtime.loop().requests().arm(); }
-  void set_model(const LocalModel& model) {
-    LocalModelSet set;
-    set.add(model);
-    runtime.loop().requests().set_local_models(set);
-  }
-  State state() const { return static_cast<State>(record.state); }
-  Vector3d force_N() const { return {record.F_out[0], record.F_out[1], record.F_out[2]}; }
-
-  VirtualClock clock;
-  std::unique_ptr<SimulatedLink> link;
-  Runtime runtime;
-  TickRecord record;
-  Vector3d true_velocity_m_per_s = Vector3d::Zero();
-};
 
 constexpr Vector3d::Scalar kFreeHeight_m = 0.04;
 
