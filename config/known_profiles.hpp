@@ -13,9 +13,9 @@ namespace wrenchd {
 
 /// All valid profiles along a search path.
 struct KnownProfiles {
-  std::vector<DeviceProfile> profiles;         ///< in the order of their file names
-  std::vector<std::filesystem::path> files;    ///< file of each profile
-  std::vector<std::string> rejected;  ///< for each rejected file its defects with location and remedy
+  std::vector<DeviceProfile> profiles;       ///< in the order of their file names
+  std::vector<std::filesystem::path> files;  ///< file of each profile
+  std::vector<std::string> rejected;         ///< for each rejected file its defects with location and remedy
   std::vector<std::vector<ConfigText>> texts;  ///< files of each profile as they were read, the nearest first
 };
 

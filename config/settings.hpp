@@ -107,7 +107,7 @@ struct ViewSettings {
 /// Settings of wrenchd.toml.
 struct Settings {
   std::filesystem::path file;
-  std::string description;            ///< description of the scene and what to try, for display
+  std::string description;  ///< description of the scene and what to try, for display
   std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< searched along the search path
   DeviceSettings device;
   ServoSettings servo;

@@ -78,7 +78,7 @@ struct SceneSettings {
   /// Contacts may use a surface that encloses a solid and lies at most this far outside of it [m]; 0: the
   /// mesh as loaded. Rounding of single precision may raise it (collision/meshes/mesh_simplifier.hpp).
   double surface_tolerance_m = 1e-6;
-  std::string text = {};       ///< content of the source file as it was read; empty: not from a file
+  std::string text = {};  ///< content of the source file as it was read; empty: not from a file
 };
 
 }  // namespace wrenchd

@@ -151,7 +151,8 @@ TEST_CASE("wrenchctl udev-rules: each profile adds a rule, and an invalid profil
 
 TEST_CASE("a name that would begin a rule of its own makes no rules", "[udev_rules]") {
   for (const char* name : {"x\nRUN+=\"/bin/sh -c id\"", "x y", "", "a\"b"})
-    CHECK_THROWS_AS(udev_rules(std::vector{profile(name, Transport::hidraw, {{0x1209, 1}})}), std::invalid_argument);
+    CHECK_THROWS_AS(udev_rules(std::vector{profile(name, Transport::hidraw, {{0x1209, 1}})}),
+                    std::invalid_argument);
 }
 
 }  // namespace

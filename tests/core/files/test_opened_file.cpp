@@ -94,7 +94,8 @@ TEST_CASE("a scope permits files beneath its directories that are reached withou
     CHECK(rejection(inside / "b/none", scope).first == FileProblem::missing);
     CHECK(rejection(inside / "a/none", scope).first == FileProblem::missing);
     // Outside, the answer does not depend on the file.
-    for (const fs::path& file : {dir.path() / "outside", dir.path() / "missing", inside / "../outside", fs::path("/etc/shadow")}) {
+    for (const fs::path& file :
+         {dir.path() / "outside", dir.path() / "missing", inside / "../outside", fs::path("/etc/shadow")}) {
       CHECK(rejection(file, scope).first == FileProblem::outside);
       CHECK_FALSE(scope.contains(file));
     }
@@ -102,7 +103,8 @@ TEST_CASE("a scope permits files beneath its directories that are reached withou
   CHECK_FALSE(FileScope::beneath({"/"}).contains("/etc/passwd"));
 }
 
-TEST_CASE("a name that changes between a FIFO, a link and a file gives the file or an error", "[opened_file]") {
+TEST_CASE("a name that changes between a FIFO, a link and a file gives the file or an error",
+          "[opened_file]") {
   for (const bool without_openat2 : {false, true}) {
     const Fallback fallback(without_openat2);
     const TemporaryDirectory dir;
@@ -116,9 +118,12 @@ TEST_CASE("a name that changes between a FIFO, a link and a file gives the file 
       for (int i = 0; i < kSwaps; ++i) {
         const fs::path next = inside / "next";
         ::unlink(next.c_str());
-        if (i % 3 == 0) [[maybe_unused]] const int made = ::mkfifo(next.c_str(), 0600);
-        if (i % 3 == 1) [[maybe_unused]] const int made = ::symlink("../secret", next.c_str());
-        if (i % 3 == 2) [[maybe_unused]] const int made = ::link((inside / "file").c_str(), next.c_str());
+        if (i % 3 == 0) [[maybe_unused]]
+          const int made = ::mkfifo(next.c_str(), 0600);
+        if (i % 3 == 1) [[maybe_unused]]
+          const int made = ::symlink("../secret", next.c_str());
+        if (i % 3 == 2) [[maybe_unused]]
+          const int made = ::link((inside / "file").c_str(), next.c_str());
         ::rename(next.c_str(), name.c_str());
       }
       done = true;

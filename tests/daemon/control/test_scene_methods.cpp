@@ -132,8 +132,9 @@ TEST_CASE("an invalid change is rejected with its location, and nothing changes"
   CHECK(a.ask("scene.get") == before);
 }
 
-TEST_CASE("an operator loads files beneath the directories of the configuration only, and reads nothing of them",
-          "[scene_methods]") {
+TEST_CASE(
+    "an operator loads files beneath the directories of the configuration only, and reads nothing of them",
+    "[scene_methods]") {
   const TemporaryDirectory dir;
   const std::string secret = "root:$6$sEcReT:19000:0:99999:7:::";
   const std::filesystem::path shadow = dir.write("private/shadow", secret + "\nOFF\n");
@@ -163,7 +164,8 @@ TEST_CASE("an operator loads files beneath the directories of the configuration 
   for (const auto& file : {shadow, dir.path() / "private/none"}) {
     refuses("scene.add", add(file), "outside of the directories");
     refuses("scene.load", {{"file", file.string()}}, "outside of the directories");
-    refuses("scene.load", {{"file", (dir.path() / "scenes/../private").string() + "/" + file.filename().string()}},
+    refuses("scene.load",
+            {{"file", (dir.path() / "scenes/../private").string() + "/" + file.filename().string()}},
             "outside of the directories");
   }
   CHECK(a.obstacles() == std::vector<std::string>{"table"});

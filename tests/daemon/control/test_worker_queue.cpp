@@ -35,7 +35,8 @@ struct Occupied {
   }
 };
 
-TEST_CASE("a user who fills the queue keeps no other user out of it, and does not go first", "[worker_queue]") {
+TEST_CASE("a user who fills the queue keeps no other user out of it, and does not go first",
+          "[worker_queue]") {
   std::vector<uid_t> order;
   {
     Occupied worker;

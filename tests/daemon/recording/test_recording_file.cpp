@@ -279,7 +279,8 @@ std::string rejection_after(const TemporaryDirectory& directory, const Change& c
   return {};
 }
 
-TEST_CASE("a recording that refers to other files or has other types is rejected with the reason", "[recording]") {
+TEST_CASE("a recording that refers to other files or has other types is rejected with the reason",
+          "[recording]") {
   using Catch::Contains;
   const TemporaryDirectory directory;
   const std::string secret = directory.write("secret", "root:$6$sEcReT:1:0:9:7:::\n").string();
@@ -315,7 +316,8 @@ TEST_CASE("a recording that refers to other files or has other types is rejected
   CHECK_THAT(rejection_after(directory,
                              [](hid_t file) {
                                H5Ldelete(file, "/ticks", H5P_DEFAULT);
-                               const hid_t group = H5Gcreate2(file, "/ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+                               const hid_t group =
+                                   H5Gcreate2(file, "/ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
                                H5Gclose(group);
                              }),
              Contains("'ticks' is no table and no text"));
@@ -323,7 +325,8 @@ TEST_CASE("a recording that refers to other files or has other types is rejected
                              [](hid_t file) {
                                H5Ldelete(file, "/ticks", H5P_DEFAULT);
                                const hsize_t rows = 4;
-                               const hid_t plan = H5Pcreate(H5P_DATASET_CREATE), row = H5Tcreate(H5T_COMPOUND, 8);
+                               const hid_t plan = H5Pcreate(H5P_DATASET_CREATE),
+                                           row = H5Tcreate(H5T_COMPOUND, 8);
                                H5Tinsert(row, "tick", 0, H5T_NATIVE_DOUBLE);
                                const hid_t space = H5Screate_simple(1, &rows, nullptr);
                                H5Pset_virtual(plan, space, "/etc/passwd", "/ticks", space);
@@ -372,7 +375,8 @@ TEST_CASE("a recording that refers to other files or has other types is rejected
   TickRecord tick;
   tick.state = 200;
   { RecordingWriter(file, {}).append(std::vector<TickRecord>(2, tick)); }
-  CHECK_THROWS_WITH(read_recording(file), Contains("column 'state' of table 'ticks' has the value 200 in row 0"));
+  CHECK_THROWS_WITH(read_recording(file),
+                    Contains("column 'state' of table 'ticks' has the value 200 in row 0"));
 }
 
 TEST_CASE("a FIFO or a device in place of a recording is named as what it is", "[recording]") {

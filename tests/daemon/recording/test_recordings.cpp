@@ -318,7 +318,8 @@ TEST_CASE("a recording contains the mesh that was loaded, whatever its file has 
     std::ifstream in(WRENCHD_SOURCE_DIR "/config/meshes/cube.off", std::ios::binary);
     return std::string{std::istreambuf_iterator<char>(in), {}};
   }();
-  const auto file = files.write("tool.off", mesh), secret = files.write("secret", "root:$6$sEcReT:1:0:9:7:::\n");
+  const auto file = files.write("tool.off", mesh),
+             secret = files.write("secret", "root:$6$sEcReT:1:0:9:7:::\n");
   RunConfig plan = plan_with(files.path());
   plan.scene.tool.mesh = file;
   VirtualRuntime s(plan);

@@ -61,7 +61,8 @@ TEST_CASE("the file with the address is readable by its owner alone, and is remo
   CHECK_FALSE(fs::exists(path.parent_path()));
   // Others may write to this directory, so it is not used.
   fs::permissions(runtime.path(), fs::perms::all);
-  CHECK_FALSE(AddressFile("http://127.0.0.1:4000/secret/").path().string().starts_with(runtime.path().string()));
+  CHECK_FALSE(
+      AddressFile("http://127.0.0.1:4000/secret/").path().string().starts_with(runtime.path().string()));
 }
 
 TEST_CASE("wrenchctl view --open puts the token on no command line", "[address_file]") {

@@ -116,7 +116,8 @@ TEST_CASE("other users get no answer, even with the token, and take no connectio
   std::vector<OwnedFd> strangers;
   for (int i = 0; i < 100; ++i) {
     strangers.emplace_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    REQUIRE(::connect(strangers.back().get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    REQUIRE(::connect(strangers.back().get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) ==
+            0);
   }
   char byte = 0;
   CHECK(::recv(strangers.back().get(), &byte, 1, 0) <= 0);
