@@ -85,7 +85,7 @@ void UndrivenMotion::move_driven(const Pose& X_BH, double device_time_s) noexcep
   settle(now);
 }
 
-/// METHOD (87e). A change of force acts within the delay after its sample; until then it counts at the worst
+/// METHOD (87f). A change of force acts within the delay after its sample; until then it counts at the worst
 /// place that the hand passes.
 void UndrivenMotion::settle(const PathPoint& now) noexcept {
   std::size_t kept = 0;
@@ -131,7 +131,7 @@ double UndrivenMotion::late_work_bound_J(const Vector6d& dF) const noexcept {
   return kReachFactor * (linear_m * dF.head<3>().norm() + angular_rad * dF.tail<3>().norm());
 }
 
-/// METHOD (87d): the displacement nearest to target in the metric K that the account can pay. The ball
+/// METHOD (87e): the displacement nearest to target in the metric K that the account can pay. The ball
 ///
 ///   U + g' d + 1/2 d' K d <= U + A
 ///
@@ -175,7 +175,7 @@ std::optional<Pose> UndrivenMotion::propose(const SpringState& at) noexcept {
   return displaced(X_BH_used_, d);
 }
 
-/// METHOD (87c): pays for the step, or refuses it.
+/// METHOD (87d): pays for the step, or refuses it.
 bool UndrivenMotion::accept(const Pose& X_BH, const SpringState& from, const SpringState& to) noexcept {
   const double dU_J = share_ * (to.U_J - from.U_J);
   const Vector6d dF = share_ * masked(numbers(to.F_B - from.F_B), driven_);
