@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -219,11 +221,45 @@ void get_recording(const ControlOptions& options) {
   if (output != "-") print(output + "\n");
 }
 
+/// Returns the conditions of NAME=VALUE. A value that is a number becomes one; every other value is a text.
+Json conditions_of(const std::vector<std::string>& settings) {
+  Json conditions = Json::object();
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw std::runtime_error("record mark: --set " + setting +
+                               ": expected NAME=VALUE, as in --set stiffness=2000");
+    const std::string value = setting.substr(equals + 1);
+    double number = 0.0;
+    const char* const end = value.data() + value.size();
+    const auto parsed = std::from_chars(value.data(), end, number);
+    if (parsed.ec == std::errc() && parsed.ptr == end && std::isfinite(number))
+      conditions[setting.substr(0, equals)] = number;
+    else
+      conditions[setting.substr(0, equals)] = value;
+  }
+  return conditions;
+}
+
+void mark_recording(const ControlOptions& options) {
+  if (options.file.empty())
+    throw std::runtime_error("record mark: a label is missing, as in wrenchctl record mark \"trial 3\"");
+  Json params = {{"label", options.file}};
+  if (!options.conditions.empty()) params["conditions"] = conditions_of(options.conditions);
+  Client client(options.socket, kResponseTimeout);
+  const Json result = call(client, "record.mark", params);
+  print(options.json ? pretty(result)
+                     : fmt::format("marked {} in {}\n", options.file, result["file"].get<std::string>()));
+}
+
 void run_record(const ControlOptions& options) {
-  if (!options.file.empty() && options.method != "start" && options.method != "get")
-    throw std::runtime_error("record " + options.method + ": accepts no file; only start and get do");
+  if (!options.conditions.empty() && options.method != "mark")
+    throw std::runtime_error("record " + options.method + ": accepts no --set; only mark does");
   if (!options.output.empty() && options.method != "get")
     throw std::runtime_error("record " + options.method + ": accepts no -o; only get does");
+  if (options.method == "mark") return mark_recording(options);
+  if (!options.file.empty() && options.method != "start" && options.method != "get")
+    throw std::runtime_error("record " + options.method + ": accepts no file; only start and get do");
   if (options.method == "list") return list_recordings(options);
   if (options.method == "get") return get_recording(options);
   Json params = Json::object();

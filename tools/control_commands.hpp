@@ -16,6 +16,7 @@ struct ControlOptions {
   std::string method;
   std::string file;
   std::string output;
+  std::vector<std::string> conditions;  ///< "stiffness=2000"
   bool preempt = false;
 };
 
@@ -30,7 +31,7 @@ void run_watch(const ControlOptions& options);
 int run_arm(const ControlOptions& options);
 /// Sends a request without parameters, and prints its effect.
 void run_request(const std::string& method, const ControlOptions& options);
-/// options.method: start, stop, status, list or get.
+/// options.method: start, stop, mark, status, list or get.
 void run_record(const ControlOptions& options);
 void run_describe(const ControlOptions& options);
 

@@ -21,7 +21,12 @@ bool replace_file(const std::filesystem::path& file, const Write& write) {
       std::filesystem::is_symlink(file, error) ? std::filesystem::weakly_canonical(file, error) : file;
   const std::filesystem::path beside = place.string() + "." + std::to_string(getpid()) + ".part";
   std::ofstream out(beside, std::ios::binary);
-  write(out);
+  try {
+    write(out);
+  } catch (...) {
+    std::filesystem::remove(beside, error);
+    throw;
+  }
   out.close();
   if (out) std::filesystem::rename(beside, place, error);
   if (out && !error) return true;

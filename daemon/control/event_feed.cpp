@@ -90,7 +90,7 @@ EventFeed::EventFeed(ServoLoop& loop)
         guard.run([this] { drain(); });
         guard.run([this] {
           const std::scoped_lock lock(drain_mutex_, mutex_);
-          append_held_back_faults(std::chrono::steady_clock::now());
+          append_held_back_faults(std::chrono::steady_clock::now(), Source::other);
         });
       }) {}
 
@@ -99,21 +99,25 @@ EventFeed::~EventFeed() {
   thread_.join();
 }
 
-void EventFeed::emit(const std::string& name, EventLevel level, const std::string& text, const Json& fields) {
+TimePoint EventFeed::emit(const std::string& name, EventLevel level, const std::string& text,
+                          const Json& fields) {
   const std::scoped_lock lock(mutex_);
-  append(std::chrono::steady_clock::now(), name, level, text, fields);
+  const TimePoint at = std::chrono::steady_clock::now();
+  append(at, name, level, text, fields, Source::other);
+  return at;
 }
 
 /// Precondition: mutex_ is locked, so that snapshot and sequence number change together.
 void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
-                       const Json& fields) {
+                       const Json& fields, Source source) {
   Json params = {{"sequence", ++snapshot_.sequence},
                  {"time_ns", at.time_since_epoch().count()},
                  {"name", name},
                  {"level", wrenchd::name(level)},
                  {"text", text}};
   for (const auto& [key, value] : fields.items()) params[key] = value;
-  history_.push_back({name, notification_line("event", params)});
+  history_.push_back(
+      {at, source == Source::loop, name, level, text, fields, notification_line("event", params)});
   if (history_.size() > kHistorySize) history_.pop_front();
   spdlog::log(log_level(level), "{}", text);
   if (wake_fd_ < 0) return;
@@ -145,7 +149,8 @@ void EventFeed::publish(const Event& event) {
   }
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
-  if (std::holds_alternative<Event::StateChanged>(event.data)) append_held_back_faults(event.at);
+  if (std::holds_alternative<Event::StateChanged>(event.data))
+    append_held_back_faults(event.at, Source::loop);
   const State from = snapshot_.state;
   apply(snapshot_, event, description);
   append(event.at, description.name, description.level, description.text, description.fields);
@@ -155,11 +160,11 @@ void EventFeed::publish(const Event& event) {
 
 /// Publishes how often faults were raised that changed no state. Precondition: drain_mutex_ and mutex_ are
 /// locked.
-void EventFeed::append_held_back_faults(TimePoint at) {
+void EventFeed::append_held_back_faults(TimePoint at, Source source) {
   for (const auto& [fault, count] : fault_repeats_.take())
     append(at, "fault", EventLevel::warning,
            fmt::format("{}: raised {} more times until now, without an effect", fault_row(fault).name, count),
-           {{"fault", fault_json(fault)}, {"value", 0.0}, {"repeats", count}});
+           {{"fault", fault_json(fault)}, {"value", 0.0}, {"repeats", count}}, source);
 }
 
 /// The states show whether a device came or went, on every kind of link.
@@ -186,7 +191,7 @@ void EventFeed::drain() {
   append(std::chrono::steady_clock::now(), "state", EventLevel::warning,
          fmt::format("{} events were dropped: the log fell behind; state: {}", dropped - dropped_reported_,
                      wrenchd::name(snapshot_.state)),
-         {{"state", wrenchd::name(snapshot_.state)}, {"cause", fault_json(snapshot_.cause)}});
+         {{"state", wrenchd::name(snapshot_.state)}, {"cause", fault_json(snapshot_.cause)}}, Source::other);
   dropped_reported_ = dropped;
 }
 
@@ -203,7 +208,7 @@ EventFeed::Batch EventFeed::events_since(std::uint64_t next, const std::set<std:
   if (next < first) batch.lost = first - next;
   batch.next = next + batch.lost;
   for (std::size_t bytes = 0; batch.next <= snapshot_.sequence; ++batch.next) {
-    const StoredEvent& event = history_[batch.next - first];
+    const FeedEvent& event = history_[batch.next - first];
     if (!names.empty() && !names.contains(event.name)) continue;
     if (bytes > 0 && bytes + event.line.size() > max_bytes) break;
     bytes += event.line.size();
@@ -211,6 +216,16 @@ EventFeed::Batch EventFeed::events_since(std::uint64_t next, const std::set<std:
   }
   batch.more = batch.next <= snapshot_.sequence;
   return batch;
+}
+
+EventFeed::Stored EventFeed::stored_since(std::uint64_t next) const {
+  const std::scoped_lock lock(mutex_);
+  const std::uint64_t first = snapshot_.sequence + 1 - history_.size();
+  Stored stored;
+  if (next < first) stored.lost = first - next;
+  for (std::uint64_t at = next + stored.lost; at <= snapshot_.sequence; ++at)
+    stored.events.push_back(history_[at - first]);
+  return stored;
 }
 
 void EventFeed::set_wake_fd(int eventfd) {

@@ -41,6 +41,17 @@ struct FeedSnapshot {
   double stiffness_scale = 1.0;                  ///< stable fraction of the configured stiffness, 0 to 1
 };
 
+/// An event as the feed stores it.
+struct FeedEvent {
+  TimePoint at{};
+  bool by_loop = false;  ///< true: emitted by the servo thread, so `at` is the start of a tick
+  std::string name;
+  EventLevel level = EventLevel::info;
+  std::string text;
+  Json fields;       ///< an object: what the event says to programs
+  std::string line;  ///< notification for subscribers, with its '\n'
+};
+
 /// Numbers and logs the events of the daemon, and stores the newest for subscribers. A thread of its own
 /// reads the event ring of the servo thread. Every other thread calls emit(). Not RT-safe: allocates, locks,
 /// logs.
@@ -52,9 +63,10 @@ class EventFeed {
   EventFeed(const EventFeed&) = delete;
   EventFeed& operator=(const EventFeed&) = delete;
 
-  /// Publishes an event. fields: an object, whose members are added to those of every event.
-  void emit(const std::string& name, EventLevel level, const std::string& text,
-            const Json& fields = Json::object());
+  /// Publishes an event, and returns its time. fields: an object, whose members are added to those of every
+  /// event.
+  TimePoint emit(const std::string& name, EventLevel level, const std::string& text,
+                 const Json& fields = Json::object());
 
   /// Called for each fault that latches or releases the hand, before the fault is published. Returns the file
   /// that will hold the ticks before the fault; empty: none. The event names this file. Runs on the thread of
@@ -76,6 +88,13 @@ class EventFeed {
   /// Returns events from this sequence number on that have one of these names (empty: all), up to max_bytes.
   Batch events_since(std::uint64_t next, const std::set<std::string>& names, std::size_t max_bytes) const;
 
+  struct Stored {
+    std::vector<FeedEvent> events;
+    std::uint64_t lost = 0;  ///< events that left the history before they were read
+  };
+  /// Returns all stored events from this sequence number on, with what a recording needs.
+  Stored stored_since(std::uint64_t next) const;
+
   /// Sets the eventfd that the feed writes to with each event; -1: none. It must stay open until it is unset.
   void set_wake_fd(int eventfd);
 
@@ -83,15 +102,11 @@ class EventFeed {
   static constexpr std::size_t kHistorySize = 1024;
 
  private:
-  struct StoredEvent {
-    std::string name;
-    std::string line;
-  };
-
   void publish(const Event& event);
+  enum class Source : std::uint8_t { loop, other };
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
-              const Json& fields);
-  void append_held_back_faults(TimePoint at);
+              const Json& fields, Source source = Source::loop);
+  void append_held_back_faults(TimePoint at, Source source);
   void append_device_event(TimePoint at, State from, State to);
 
   ServoLoop& loop_;
@@ -102,8 +117,8 @@ class EventFeed {
   FaultRepeats fault_repeats_;                   ///< protected by drain_mutex_
   ThreadGuard record_guard_{"flight recorder"};  ///< protected by drain_mutex_
 
-  mutable std::mutex mutex_;         ///< protects history_, snapshot_ and wake_fd_
-  std::deque<StoredEvent> history_;  ///< the last event has the number snapshot_.sequence
+  mutable std::mutex mutex_;       ///< protects history_, snapshot_ and wake_fd_
+  std::deque<FeedEvent> history_;  ///< the last event has the number snapshot_.sequence
   FeedSnapshot snapshot_;
   int wake_fd_ = -1;
 

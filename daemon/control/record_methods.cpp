@@ -30,6 +30,20 @@ MethodResult stop(Recordings& recordings) {
                                 : "No recording runs; the last one ended with an error: " + failed + ".");
 }
 
+MethodResult mark(Recordings& recordings, const Json& params) {
+  try {
+    const Json conditions = params.value("conditions", Json::object());
+    if (const auto marked = recordings.mark(params["label"].get<std::string>(), conditions))
+      return Json{{"file", marked->file.string()}, {"time_ns", marked->time_ns}};
+  } catch (const std::invalid_argument& error) {
+    throw RpcError(RpcCode::invalid_params, "record.mark: " + std::string(error.what()) + ".");
+  } catch (const RecordingError& error) {
+    throw RpcError(RpcCode::rejected, "record.mark: " + std::string(error.what()) + ".");
+  }
+  throw RpcError(RpcCode::invalid_state,
+                 "No recording runs, so nothing would contain the marker; 'record.start' starts one.");
+}
+
 Json list(const Recordings& recordings) {
   Json all = Json::array();
   for (const StoredRecording& one : recordings.list())
@@ -67,6 +81,21 @@ void add_record_methods(MethodTable& table, Recordings& recordings) {
                "A recording changed. phase: started, ended (ticks; lost: number of missing ticks), failed "
                "(reason), flight (fault: the fault that the flight recorder has recorded). file: the "
                "recording."});
+  table.add(
+      EventRow{"marker",
+               "A client set a marker in the running recording. label; conditions: an object of numbers "
+               "and texts, which hold until the next marker changes them."});
+  table.add(MethodRow{"record.mark",
+                      Role::operator_,
+                      {{"label", ParamType::text, true, "one line of at most 120 bytes, as in 'trial 3'"},
+                       {"conditions", ParamType::object, false,
+                        "numbers and texts by name, as in {\"stiffness\": 2000}; at most 16, names of at "
+                        "most 32 letters, digits "
+                        "and underscores"}},
+                      "Sets a marker in the running recording: a row of /events with the tick. Returns file "
+                      "and time_ns, the time "
+                      "of the marker on the clock of the ticks. At most 20 markers per second.",
+                      [&recordings](const Json& params, const Caller&) { return mark(recordings, params); }});
   table.add(MethodRow{
       "record.start",
       Role::operator_,

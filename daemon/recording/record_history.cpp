@@ -43,8 +43,19 @@ std::int64_t RecordHistory::newest_ns() const {
   return end_ == 0 ? 0 : tick(end_ - 1).now_ns;
 }
 
+std::int64_t RecordHistory::tick_at(std::int64_t now_ns) const {
+  const std::scoped_lock lock(mutex_);
+  const std::uint64_t next = first_from(now_ns + 1);
+  return next == begin() ? -1 : static_cast<std::int64_t>(tick(next - 1).tick);
+}
+
 std::uint64_t RecordHistory::first_at_or_after(std::int64_t now_ns) const {
   const std::scoped_lock lock(mutex_);
+  return first_from(now_ns);
+}
+
+/// Precondition: mutex_ is locked.
+std::uint64_t RecordHistory::first_from(std::int64_t now_ns) const {
   std::uint64_t low = begin(), high = end_;  // binary search: the times of ticks increase
   while (low < high) {
     const std::uint64_t middle = low + (high - low) / 2;

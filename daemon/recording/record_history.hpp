@@ -39,6 +39,9 @@ class RecordHistory {
   /// Returns the number of the first stored record that began at this time [ns] or later; stored_range().end
   /// if there is none.
   std::uint64_t first_at_or_after(std::int64_t now_ns) const;
+  /// Returns the number (TickRecord::tick) of the stored tick that was in progress at this time [ns]; -1 if
+  /// none was.
+  std::int64_t tick_at(std::int64_t now_ns) const;
   /// Returns when the newest tick began [ns]; 0 if the history is empty.
   std::int64_t newest_ns() const;
 
@@ -48,6 +51,7 @@ class RecordHistory {
 
  private:
   const TickRecord& tick(std::uint64_t number) const { return ticks_[number % ticks_.size()]; }
+  std::uint64_t first_from(std::int64_t now_ns) const;
   std::uint64_t begin() const { return end_ - std::min<std::uint64_t>(end_, ticks_.size()); }
 
   mutable std::mutex mutex_;  ///< protects the members below

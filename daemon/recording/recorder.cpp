@@ -31,4 +31,11 @@ bool Recorder::write_next(std::uint64_t end, bool rest) {
   return !batch_.ticks.empty();
 }
 
+void Recorder::write_events(std::span<RecordedEvent> events) {
+  if (events.empty()) return;
+  for (RecordedEvent& event : events) event.tick = history_.tick_at(event.time_ns);
+  writer_.append_events(events);
+  writer_.flush();
+}
+
 }  // namespace wrenchd

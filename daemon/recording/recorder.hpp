@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include "daemon/recording/record_history.hpp"
 #include "daemon/recording/recording_file.hpp"
@@ -20,6 +21,9 @@ class Recorder {
   /// cost least; with `rest` set it also includes an incomplete last chunk. Returns false if there is nothing
   /// to write now. Throws RecordingError.
   bool write_next(std::uint64_t end, bool rest);
+
+  /// Writes events with the tick that was in progress. Throws RecordingError.
+  void write_events(std::span<RecordedEvent> events);
 
   const std::filesystem::path& file() const noexcept { return file_; }
   std::uint64_t next() const noexcept { return next_; }        ///< number of the next record to write

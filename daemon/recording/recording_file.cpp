@@ -10,6 +10,8 @@
 
 #include <hdf5.h>
 
+#include "daemon/recording/event_table.hpp"
+#include "daemon/recording/hdf5_handle.hpp"
 #include "daemon/recording/recording_reader.hpp"
 #include "daemon/recording/recording_rows.hpp"
 #include "daemon/servo/record_fields.hpp"
@@ -90,23 +92,7 @@ hid_t type_of(FieldType type) {
   return H5T_NATIVE_DOUBLE;
 }
 
-/// Owns an HDF5 identifier.
-class Handle {
- public:
-  using Close = herr_t (*)(hid_t);
-  Handle(hid_t id, Close close) : id_(id), close_(close) {}
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): HDF5 takes plain identifiers
-  bool ok() const { return id_ >= 0; }
-
- private:
-  hid_t id_;
-  Close close_;
-};
+using Handle = Hdf5Handle;
 
 /// Stops HDF5 from printing its error stack. RecordingError carries the message instead. The exit handler of
 /// HDF5 is off: it tries to close a file again that a full disk did not let it close, and crashes.
@@ -200,6 +186,8 @@ void write_fields(hid_t file) {
       rows.push_back({table->name, field.name, name(field.type), field.count, field.unit, field.frame,
                       field.doc, values.back().c_str()});
     }
+  for (const EventColumn& column : event_columns())
+    rows.push_back({"events", column.name, column.type, 1, column.unit, "", column.doc, column.values});
   const Handle text(text_type(H5T_VARIABLE), H5Tclose);
   const Handle type(H5Tcreate(H5T_COMPOUND, sizeof(FieldRow)), H5Tclose);
   H5Tinsert(type, "table", offsetof(FieldRow, table), text);
@@ -215,6 +203,15 @@ void write_fields(hid_t file) {
   const Handle made(H5Dcreate2(file, "/fields", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                     H5Dclose);
   H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data());
+}
+
+void describe_events(hid_t set) {
+  for (const EventColumn& column : event_columns()) {
+    const std::string name = column.name;
+    write_text(set, (name + ".unit").c_str(), column.unit);
+    write_text(set, (name + ".doc").c_str(), column.doc);
+    if (*column.values != '\0') write_text(set, (name + ".values").c_str(), column.values);
+  }
 }
 
 /// Writes the text of a configuration file, with its path as an attribute.
@@ -308,6 +305,7 @@ struct RecordingWriter::File {
   Handle contact_row;
   Handle ticks;
   Handle contacts;
+  EventTable events;
   hsize_t tick_rows = 0;
   hsize_t contact_rows = 0;
   std::vector<TickRow> rows = {};
@@ -343,9 +341,10 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const Record
   const hid_t contact_row = row_type(contact_table());
   file_.reset(new File{file, Handle(id, H5Fclose), Handle(tick_row, H5Tclose), Handle(contact_row, H5Tclose),
                        Handle(create_table(id, tick_table(), tick_row), H5Dclose),
-                       Handle(create_table(id, contact_table(), contact_row), H5Dclose)});
-  if (!file_->ticks.ok() || !file_->contacts.ok())
+                       Handle(create_table(id, contact_table(), contact_row), H5Dclose), EventTable(id)});
+  if (!file_->ticks.ok() || !file_->contacts.ok() || !file_->events.ok())
     throw RecordingError(file.string() + ": the tables cannot be created; check that the disk is not full");
+  describe_events(file_->events.set());
   write_fields(id);
   write_header(id, header);
   flush();
@@ -375,6 +374,10 @@ void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const 
   // them beyond the end until the next flush() of the file.
   if (!contacts.empty()) flush();
   file_->append(file_->ticks, file_->tick_row, file_->tick_rows, file_->rows.data(), ticks.size());
+}
+
+void RecordingWriter::append_events(std::span<const RecordedEvent> events) {
+  if (!file_->events.append(events)) file_->fail();
 }
 
 void RecordingWriter::flush() {
@@ -647,6 +650,14 @@ void send_table(hid_t file, std::uint64_t file_bytes, const TableKind& table, Re
   }
 }
 
+void send_events(hid_t file, std::uint64_t file_bytes, RecordingSender& sender) {
+  const Handle set(open_set(file, "events"), H5Dclose);
+  if (!set.ok()) reject("has no table 'events'; name a recording of wrenchd");
+  const EventsRead events = read_events(set, file_bytes * kMaxExpansion / event_row_bytes() + 1);
+  if (events.error != nullptr) reject(std::string("table 'events' ") + events.error);
+  sender.send(events.events);
+}
+
 }  // namespace
 
 void send_hdf5(int descriptor, std::uint64_t file_bytes, const std::function<void()>& open_done,
@@ -663,6 +674,7 @@ void send_hdf5(int descriptor, std::uint64_t file_bytes, const std::function<voi
   sender.send(read_header(file, file_bytes));
   send_table<TickRow>(file, file_bytes, tick_table(), sender);
   send_table<Touch>(file, file_bytes, contact_table(), sender);
+  send_events(file, file_bytes, sender);
   sender.end();
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "collision/touch.hpp"
+#include "daemon/recording/recorded_event.hpp"
 #include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {
@@ -71,9 +72,12 @@ struct RecordBatch {
 ///   /ticks      one row per tick, one column per field; columns first_contact and contact_count refer to
 ///               rows of /contacts
 ///   /contacts   one row per contact, one column per field
-///   /fields     description of the columns of both tables: name, type, count, unit, frame, meaning, value
-///   names /config     texts: settings, scene, profile, hand_script, parents of the profile /meshes contents
-///   of the mesh files tool, obstacle_0, ..., with path and SHA-256
+///   /events     one row per event of the daemon and per marker: time, tick, severity, name, text, value,
+///               conditions
+///   /fields     description of the columns of the tables: table, name, type, count, unit, frame, meaning,
+///               names of the values
+///   /config     texts: settings, scene, profile, hand_script, parents of the profile
+///   /meshes     contents of the mesh files tool, obstacle_0, ..., with path and SHA-256
 ///
 /// Unit, frame and meaning of column X are also the attributes "X.unit", "X.frame" and "X.doc" of its table.
 /// Attributes of the file: format, versions, rate, and start time on the clock of the ticks and in UTC.
@@ -91,6 +95,8 @@ class RecordingWriter {
   void append(std::span<const TickRecord> records);
   /// Appends ticks with contacts. Throws RecordingError.
   void append(const RecordBatch& batch) { append(batch.ticks, batch.contact_ranges, batch.contacts); }
+  /// Appends events. Throws RecordingError.
+  void append_events(std::span<const RecordedEvent> events);
   /// Passes all appended data to the operating system. Throws RecordingError.
   void flush();
 
@@ -111,6 +117,7 @@ struct Recording {
   std::vector<TickRecord> ticks;
   std::vector<ContactRange> contact_ranges;  ///< Range in `contacts` for each tick.
   std::vector<Touch> contacts;
+  std::vector<RecordedEvent> events;
 
   /// Returns the contacts of the tick in this row. RT-safe.
   std::span<const Touch> contacts_of(std::size_t row) const {

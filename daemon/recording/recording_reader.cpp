@@ -202,6 +202,7 @@ Recording assemble(ReceivedRecording received) {
   Recording recording;
   recording.header = std::move(received.header);
   recording.contacts = std::move(received.contacts);
+  recording.events = std::move(received.events);
   recording.ticks.reserve(rows.size());
   recording.contact_ranges.reserve(rows.size());
   for (const TickRow& row : rows) {

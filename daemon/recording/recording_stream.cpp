@@ -19,7 +19,7 @@
 namespace wrenchd {
 namespace {
 
-enum Kind : std::uint8_t { kHeader = 1, kTicks, kContacts, kEnd, kRejected };
+enum Kind : std::uint8_t { kHeader = 1, kTicks, kContacts, kEvents, kEnd, kRejected };
 
 /// Longest reason of a rejection.
 constexpr std::uint64_t kMaxReasonBytes = 4096;
@@ -80,6 +80,27 @@ RecordingHeader read_header(std::string_view bytes) {
     header.files.push_back(std::move(file));
   }
   return header;
+}
+
+std::vector<RecordedEvent> read_events(std::string_view bytes) {
+  Reader in(bytes);
+  std::vector<RecordedEvent> events;
+  while (!in.at_end()) {
+    RecordedEvent event;
+    event.time_ns = static_cast<std::int64_t>(in.number());
+    event.tick = static_cast<std::int64_t>(in.number());
+    const std::uint64_t severity = in.number();
+    if (severity > static_cast<std::uint64_t>(EventLevel::error))
+      throw BrokenStream("an event has an unknown severity");
+    event.severity = static_cast<EventLevel>(severity);
+    const std::uint64_t value = in.number();
+    std::memcpy(&event.value, &value, sizeof value);
+    event.name = in.text();
+    event.text = in.text();
+    event.conditions = in.text();
+    events.push_back(std::move(event));
+  }
+  return events;
 }
 
 /// The stream of one sender.
@@ -203,6 +224,20 @@ void RecordingSender::send(std::span<const Touch> rows) {
   message(kContacts, rows.data(), rows.size_bytes());
 }
 
+void RecordingSender::send(std::span<const RecordedEvent> events) {
+  std::string out;
+  for (const RecordedEvent& event : events) {
+    append(out, static_cast<std::uint64_t>(event.time_ns));
+    append(out, static_cast<std::uint64_t>(event.tick));
+    append(out, std::uint64_t{static_cast<std::uint8_t>(event.severity)});
+    std::uint64_t value = 0;
+    std::memcpy(&value, &event.value, sizeof value);
+    append(out, value);
+    for (const std::string* text : {&event.name, &event.text, &event.conditions}) append(out, *text);
+  }
+  message(kEvents, out.data(), out.size());
+}
+
 void RecordingSender::end() {
   message(kEnd, "", 0);
 }
@@ -233,6 +268,8 @@ ReceivedRecording receive_recording(int pipe, const std::filesystem::path& file,
       read_rows(stream, bytes, received.ticks);
     } else if (kind == kContacts) {
       read_rows(stream, bytes, received.contacts);
+    } else if (kind == kEvents) {
+      received.events = read_events(read_bytes(stream, bytes));
     } else if (kind == kEnd && bytes == 0) {
       break;
     } else {

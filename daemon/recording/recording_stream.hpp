@@ -23,6 +23,7 @@ class RecordingSender {
   void send(const RecordingHeader& header);
   void send(std::span<const TickRow> rows);
   void send(std::span<const Touch> rows);
+  void send(std::span<const RecordedEvent> events);
   void end();
   /// Says why the file is rejected, in place of end(). reason: without the name of the file.
   void reject(const std::string& reason);
@@ -38,6 +39,7 @@ struct ReceivedRecording {
   RecordingHeader header;
   std::vector<TickRow> ticks;
   std::vector<Touch> contacts;
+  std::vector<RecordedEvent> events;
 };
 
 /// The sender has ended, or what it sent is no recording.

@@ -44,6 +44,8 @@ Recordings::Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pa
       settings_(runtime.config().settings.recording),
       directory_(recordings_directory(settings_)),
       flight_s_(pace == Pace::threads ? settings_.flight_s : 0.0),
+      emitted_time_(pace == Pace::threads ? EventLog::EmittedTime::as_stated
+                                          : EventLog::EmittedTime::of_newest_tick),
       state_(runtime.enable_shared_state()),
       history_(history_ticks(flight_s_, state_.rate_Hz())) {
   status_.directory = directory_;
@@ -121,6 +123,8 @@ void Recordings::begin(const std::filesystem::path& file, const std::filesystem:
   std::error_code ignored;
   if (std::filesystem::is_directory(directory, ignored)) check_free_space(directory, settings_);
   running_ = std::make_unique<Recorder>(history_, file, header, history_.stored_range().end);
+  running_events_ =
+      std::make_unique<EventLog>(feed_, feed_.snapshot().sequence + 1, header.started_ns, emitted_time_);
   running_directory_ = directory;
   missed_at_start_ = missed_total_.load();
   {
@@ -134,11 +138,13 @@ void Recordings::begin(const std::filesystem::path& file, const std::filesystem:
 
 std::optional<Recordings::Summary> Recordings::stop() {
   collect_ticks();
+  feed_.drain();
   const std::scoped_lock lock(write_mutex_);
   if (!running_) return {};
   try {
     while (running_ && running_->write_next(history_.stored_range().end, true)) {
     }
+    write_events(*running_, *running_events_, true);
   } catch (const std::exception& error) {
     fail(error.what());
     return {};
@@ -249,12 +255,35 @@ bool Recordings::write_running(bool rest) {
   if (!running_) return false;
   try {
     const bool more = running_->write_next(history_.stored_range().end, rest);
+    write_events(*running_, *running_events_, false);
     publish();
     return more;
   } catch (const std::exception& error) {
     fail(error.what());
   }
   return false;
+}
+
+/// Writes the events up to the newest tick; all: every event.
+void Recordings::write_events(Recorder& recorder, EventLog& log, bool all) {
+  const std::int64_t newest_ns = history_.newest_ns();
+  std::vector<RecordedEvent> events = all ? log.take_all(newest_ns) : log.take(newest_ns);
+  recorder.write_events(events);
+}
+
+std::optional<Recordings::Marked> Recordings::mark(const std::string& label, const Json& conditions) {
+  check_marker(label, conditions);
+  const auto running = status().running;
+  if (!running) return {};
+  {
+    const std::scoped_lock lock(marker_mutex_);
+    if (!marker_rate_.admit(clock_.now()))
+      throw RecordingError("more than " + std::to_string(static_cast<int>(MarkerRate::kPerSecond)) +
+                           " markers per second; mark less often");
+  }
+  const TimePoint at =
+      feed_.emit("marker", EventLevel::info, label, {{"label", label}, {"conditions", conditions}});
+  return Marked{running->file, at.time_since_epoch().count()};
 }
 
 /// Ends the recording if the free space falls below keep_free_MB. Runs after each piece, because other
@@ -280,7 +309,8 @@ std::string Recordings::begin_flight(Fault fault, TimePoint at) {
   flight.file = flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name);
   flight.fault = fault;
   // The number is taken now: until the writer begins, ticks may leave the history, and then they are counted.
-  flight.first = history_.first_at_or_after((at - from_seconds(flight_s_)).time_since_epoch().count());
+  flight.from_ns = (at - from_seconds(flight_s_)).time_since_epoch().count();
+  flight.first = history_.first_at_or_after(flight.from_ns);
   flight.missed_before = missed_total_.load();
   flight.until_ns = (at + kAfterFault).time_since_epoch().count();
   flight.requested_at = std::chrono::steady_clock::now();
@@ -309,6 +339,9 @@ bool Recordings::write_flight(bool rest) {
       status.unlock();
     }
     if (flight.recorder->write_next(flight.end, true)) return true;
+    EventLog log(feed_, 1, flight.from_ns, emitted_time_);
+    std::vector<RecordedEvent> events = log.take(flight.until_ns);
+    flight.recorder->write_events(events);
     end_flight({});
   } catch (const std::exception& error) {
     end_flight(error.what());

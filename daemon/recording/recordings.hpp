@@ -15,6 +15,8 @@
 #include "core/clock.hpp"
 #include "core/fault.hpp"
 #include "daemon/control/event_feed.hpp"
+#include "daemon/recording/event_log.hpp"
+#include "daemon/recording/marker.hpp"
 #include "daemon/recording/record_history.hpp"
 #include "daemon/recording/recorder.hpp"
 #include "daemon/recording/recording_directory.hpp"
@@ -67,6 +69,16 @@ class Recordings {
   /// Writes the remaining ticks and closes the file. Returns nothing if no recording runs.
   std::optional<Summary> stop();
 
+  struct Marked {
+    std::filesystem::path file;  ///< the running recording
+    std::int64_t time_ns = 0;    ///< time of the marker, on the clock of the ticks
+  };
+  /// Sets a marker in the running recording, with conditions that hold until the next marker changes them,
+  /// and emits the event `marker`. conditions: an object of numbers and texts (daemon/recording/marker.hpp).
+  /// Returns nothing if no recording runs. Throws std::invalid_argument if the marker exceeds its bounds, and
+  /// RecordingError if there are too many markers per second.
+  std::optional<Marked> mark(const std::string& label, const Json& conditions);
+
   /// Returns the complete recordings in the recordings directory, the oldest first.
   std::vector<StoredRecording> list() const;
   /// Opens a complete recording for reading. Throws RecordingError.
@@ -92,6 +104,7 @@ class Recordings {
     Fault fault = Fault::none;
     std::int64_t until_ns = 0;
     std::uint64_t first = 0;          ///< number of the first record of the flight
+    std::int64_t from_ns = 0;         ///< time from which the flight contains events
     std::uint64_t missed_before = 0;  ///< missed_total_ when the fault was raised
     TimePoint requested_at{};
     std::unique_ptr<Recorder> recorder;  ///< null before the writer begins
@@ -103,6 +116,7 @@ class Recordings {
   bool write(bool rest);
   bool write_running(bool rest);
   bool write_flight(bool rest);
+  void write_events(Recorder& recorder, EventLog& log, bool all);
   void check_disk_space();
   Summary finish();
   void fail(const std::string& why);
@@ -117,6 +131,7 @@ class Recordings {
   RecordingSettings settings_;
   std::filesystem::path directory_;
   double flight_s_;
+  EventLog::EmittedTime emitted_time_;
   SharedState& state_;
   RecordHistory history_;
 
@@ -128,8 +143,12 @@ class Recordings {
   std::mutex write_mutex_;  ///< protects the members up to missed_at_start_
   bool closed_ = false;     ///< no recording can start any more
   std::unique_ptr<Recorder> running_;
-  std::filesystem::path running_directory_;  ///< directory of the running recording; an absolute path
-  std::uint64_t missed_at_start_ = 0;        ///< missed_total_ at the start of the running recording
+  std::unique_ptr<EventLog> running_events_;  ///< not null while a recording runs
+  std::filesystem::path running_directory_;   ///< directory of the running recording; an absolute path
+  std::uint64_t missed_at_start_ = 0;         ///< missed_total_ at the start of the running recording
+
+  std::mutex marker_mutex_;  ///< protects marker_rate_
+  MarkerRate marker_rate_;
 
   mutable std::mutex status_mutex_;  ///< protects flight_ and status_
   std::optional<Flight> flight_;

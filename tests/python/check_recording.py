@@ -24,10 +24,10 @@ def check(what, good):
 
 
 with h5py.File(sys.argv[1], "r") as file:
-    ticks, contacts = file["ticks"], file["contacts"]
+    ticks, contacts, events = file["ticks"], file["contacts"], file["events"]
     for name, unit in UNITS.items():
         check(name + " has its unit", ticks.attrs[name + ".unit"] == unit)
-    for table in (ticks, contacts):
+    for table in (ticks, contacts, events):
         for name in table.dtype.names:
             check(name + " has a unit", len(table.attrs[name + ".unit"]) > 0)
             check(name + " has a meaning", len(table.attrs[name + ".doc"]) > 0)
@@ -36,7 +36,7 @@ with h5py.File(sys.argv[1], "r") as file:
     check("states have names", names[5] == "active")
 
     fields = file["fields"]
-    check("one row per column", len(fields) == len(ticks.dtype.names) + len(contacts.dtype.names))
+    check("one row per column", len(fields) == sum(len(t.dtype.names) for t in (ticks, contacts, events)))
     rows = {(row["table"].decode(), row["name"].decode()): row for row in fields}
     check("the table of fields has units", rows[("ticks", "F_out")]["unit"].decode() == UNITS["F_out"])
     check("the table of fields has counts", rows[("ticks", "F_out")]["count"] == 6)
@@ -62,6 +62,13 @@ with h5py.File(sys.argv[1], "r") as file:
         check("unit normals", np.allclose(np.linalg.norm(of_tick["normal_W"], axis=1), 1.0))
         load = np.sum(of_tick["load_fraction"])
         check("load fractions sum to 1", load == 0.0 or abs(load - 1.0) < 1e-6)
+
+    # The events of the loop name the tick in which they happened.
+    changes = events[:][events["name"] == b"state"]
+    check("changes of the state are events", b"state: active" in set(changes["text"]))
+    for row in changes[changes["tick"] >= 0]:
+        at = np.flatnonzero(ticks["tick"] == row["tick"])
+        check("an event has the tick of its time", len(at) and row["time_ns"] == ticks["now_ns"][at[0]])
 
     # The configuration of the run.
     check("the settings", "[servo]" in file["config/settings"][()].decode())

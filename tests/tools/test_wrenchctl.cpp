@@ -582,7 +582,7 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
        "doctor, "
        "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, "
        "gallery, "
-       "paper, replay, export, plot) is required"},
+       "paper, replay, export, plot, sweep) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},

@@ -38,6 +38,17 @@ test(async () => {
   const columns = JSON.parse(execFileSync("/usr/bin/python3", [script, recording, ...numbers.map(String)]));
   assert.ok(columns.rows.some(({ state, contacts }) => STATES[state] === "active" && contacts > 0));
 
+  // A marker of an experiment, as record.mark writes it while a recording runs in wall time.
+  execFileSync("/usr/bin/python3", ["-c", `
+import sys, h5py
+with h5py.File(sys.argv[1], "r+") as file:
+    events = file["events"]
+    events.resize(len(events) + 1, 0)
+    row = events[-1]
+    row["name"], row["text"], row["conditions"] = b"marker", b"trial 3", b'{"stiffness":2000}'
+    row["time_ns"] = file["ticks"]["now_ns"][0] + 3_000_000_000
+    events[-1] = row
+`, recording]);
   const { url } = await view([recording]);
   const page = await open(url);
   await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
@@ -54,6 +65,7 @@ test(async () => {
     await until(`tick ${row.tick} is shown`, async () => (await text(page, "tick")) === String(row.tick));
     const what = `tick ${row.tick}`;
     assert.equal(await text(page, "state"), STATES[row.state], what);
+    assert.equal(await text(page, "marker"), row.t >= 3 ? "trial 3 (stiffness 2000), at 3.00 s" : "none until now", what);
     near(Number(await text(page, "force")), length3(row.F_out), 0.00501, `${what}, force`);
     near(Number(await text(page, "torque")), 1e3 * length3(row.F_out.slice(3)), 0.0501, `${what}, torque`);
     const gap = [0, 1, 2].map((i) => row.X_WQ[i] - row.X_WP[i]);

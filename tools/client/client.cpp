@@ -73,6 +73,13 @@ std::string Client::call(const std::string& method, const std::string& params, i
   return connection_->call(method, parameters(method, params), &descriptor).dump();
 }
 
+void Client::mark(const std::string& label, const std::map<std::string, Condition>& conditions) {
+  json params = {{"label", label}};
+  for (const auto& [name, value] : conditions)
+    std::visit([&params, &name = name](const auto& one) { params["conditions"][name] = one; }, value);
+  connection_->call("record.mark", params);
+}
+
 std::string Client::state() {
   return connection_->call("status", json::object()).value("state", "unknown");
 }

@@ -51,16 +51,24 @@ class DaemonCommands final : public Subcommand {
 
   void add_record(CLI::App& app) {
     CLI::App* record = add(app, "record",
-                           "Start or stop a recording of every tick, show its progress, list recordings\n"
-                           "and copy them",
+                           "Start or stop a recording of every tick, show its progress, set markers in it,\n"
+                           "list recordings and copy them",
                            [this] { run_record(options_); });
-    record->add_option("what", options_.method, "start, stop, status, list or get")
+    record->add_option("what", options_.method, "start, stop, mark, status, list or get")
         ->required()
-        ->check(CLI::IsMember({"start", "stop", "status", "list", "get"}));
+        ->check(CLI::IsMember({"start", "stop", "mark", "status", "list", "get"}));
     record
-        ->add_option("file", options_.file,
-                     "for start: a name in the daemon's recording directory, or for administrators a path;\n"
-                     "without it, a name from the time. For get: a name in the list")
+        ->add_option(
+            "file", options_.file,
+            "for start: a name in the daemon's recording directory, or for administrators a path;\n"
+            "without it, a name from the time. For mark: the label of the marker. For get: a name in\n"
+            "the list")
+        ->check(not_empty());
+    record
+        ->add_option(
+            "--set", options_.conditions,
+            "for mark: a condition NAME=VALUE, a number or a text, which holds until the next marker\n"
+            "changes it; repeatable")
         ->check(not_empty());
     record
         ->add_option("-o,--output", options_.output,

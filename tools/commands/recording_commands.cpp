@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
-#include <sstream>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +12,8 @@
 #include "daemon/option_checks.hpp"
 #include "daemon/recording/recording_file.hpp"
 #include "tools/commands/subcommand.hpp"
+#include "tools/export_mat.hpp"
+#include "tools/export_mcap.hpp"
 #include "tools/export_recording.hpp"
 #include "tools/output_file.hpp"
 #include "tools/plot_recording.hpp"
@@ -55,9 +56,14 @@ class RecordingCommands final : public Subcommand {
   }
 
   void add_export(CLI::App& app) {
-    CLI::App* command = app.add_subcommand("export", "Export a recording as CSV, with units in the headings");
+    CLI::App* command = app.add_subcommand(
+        "export", "Export a recording as CSV with units in the headings, as MAT-file or as MCAP");
     command->add_option("recording", recording_, "HDF5 file")->required()->check(not_empty());
-    command->add_option("-o,--output", output_, "CSV file to write; without it, standard output")
+    command
+        ->add_option(
+            "-o,--output", output_,
+            "file to write: .mat for MATLAB and scipy, .mcap for Foxglove, otherwise CSV; without it, CSV\n"
+            "to standard output")
         ->check(not_empty());
     command
         ->add_option("--columns", selection_.columns,
@@ -94,9 +100,9 @@ class RecordingCommands final : public Subcommand {
   void run_export() const {
     const Recording recording = read_recording(recording_);
     if (output_.empty()) return write_csv(std::cout, recording, selection_);
-    std::ostringstream text;
-    write_csv(text, recording, selection_);
-    write_output(output_, text.str());
+    const std::string kind = std::filesystem::path(output_).extension().string();
+    const auto write = kind == ".mat" ? write_mat : kind == ".mcap" ? write_mcap : write_csv;
+    write_output(output_, [&](std::ostream& out) { write(out, recording, selection_); });
   }
 
   std::filesystem::path recording_;

@@ -58,6 +58,7 @@ std::unique_ptr<Subcommand> make_mesh_command();
 std::unique_ptr<Subcommand> make_gallery_command();
 std::unique_ptr<Subcommand> make_paper_command();
 std::unique_ptr<Subcommand> make_recording_commands();  ///< replay, export, plot
+std::unique_ptr<Subcommand> make_sweep_command();
 
 /// Prints a line about progress or a change to standard error, after the program's name.
 void print_note(const std::string& text);

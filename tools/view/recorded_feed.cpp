@@ -90,4 +90,16 @@ Json RecordedFeed::state_changes() const {
   return out;
 }
 
+Json RecordedFeed::markers() const {
+  Json out = Json::array();
+  for (const RecordedEvent& event : recording_.events) {
+    if (event.name != "marker") continue;
+    const Json conditions = Json::parse(event.conditions, nullptr, false);
+    out.push_back({{"t", static_cast<double>(event.time_ns - begin_ns()) / kNs},
+                   {"label", event.text},
+                   {"conditions", conditions.is_object() ? conditions : Json::object()}});
+  }
+  return out;
+}
+
 }  // namespace wrenchd

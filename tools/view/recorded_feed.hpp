@@ -42,6 +42,8 @@ class RecordedFeed {
   std::pair<RollingHistogram::Summary, RollingHistogram::Summary> tick_times(double t_s) const;
   /// Returns the changes of the loop state: [{t, state, cause}, ...].
   Json state_changes() const;
+  /// Returns the markers of the experiment: [{t, label, conditions}, ...]. t: time since the first tick [s].
+  Json markers() const;
 
  private:
   std::size_t index_at(double t_s) const;

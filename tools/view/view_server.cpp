@@ -223,7 +223,8 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
                     {"recorded_by", feed->version()},
                     {"duration_s", feed->duration_s()},
                     {"rate_Hz", feed->rate_Hz()},
-                    {"changes", feed->state_changes()}});
+                    {"changes", feed->state_changes()},
+                    {"markers", feed->markers()}});
       send(hello);
       if (feed->scene()) show(feed->scene());
       if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"error", feed->scene_error()}});

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
+#include <wrenchd/client.hpp>
 
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/random_values.hpp"
@@ -81,6 +83,8 @@ TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
   REQUIRE_RATE(load, daemon.presses());
   CHECK(daemon.ctl({"record", "stop"}).err.find("No recording runs; 'record.start' starts one.") !=
         std::string::npos);
+  CHECK(daemon.ctl({"record", "mark", "too early"})
+            .err.find("No recording runs, so nothing would contain the marker") != std::string::npos);
   const ProgramResult started = daemon.ctl({"record", "start", "mine"});
   INFO(started.err);
   REQUIRE(started.exit_code == 0);
@@ -89,12 +93,37 @@ TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
   CHECK(daemon.ctl({"record", "start"}).err.find("A recording is already running: " + file.string()) !=
         std::string::npos);
   CHECK(daemon.ctl({"status"}).out.find("recording  " + file.string()) != std::string::npos);
-  std::this_thread::sleep_for(4s);
+  std::this_thread::sleep_for(2s);
+  CHECK(daemon.ctl({"record", "mark", "trial 3", "--set", "stiffness=2000", "--set", "surface=felt"}).out ==
+        "marked trial 3 in " + file.string() + "\n");
+  CHECK(daemon.ctl({"record", "mark", "x", "--set", "2x=1"}).err.find("letters, digits and underscores") !=
+        std::string::npos);
+  CHECK(daemon.ctl({"record", "mark", "x", "--set", "stiffness"}).err.find("expected NAME=VALUE") !=
+        std::string::npos);
+  CHECK(daemon.ctl({"record", "mark"}).err.find("a label is missing") != std::string::npos);
+  Client(daemon.socket).mark("trial 4", {{"stiffness", 1500.5}, {"surface", std::string("wood")}});
+  std::this_thread::sleep_for(2s);
   const ProgramResult ended = daemon.ctl({"record", "stop"});
   CHECK(ended.out.starts_with("recorded " + file.string()));
   REQUIRE_RATE(load, ended.out.ends_with(" ticks, 0 missing\n"));
   REQUIRE_RATE(load, read_recording(file).ticks.size() > 3500);
   CHECK(is_gapless(read_recording(file)));
+  const Recording recording = read_recording(file);
+  std::vector<RecordedEvent> markers;
+  std::copy_if(recording.events.begin(), recording.events.end(), std::back_inserter(markers),
+               [](const RecordedEvent& event) { return event.name == "marker"; });
+  REQUIRE(markers.size() == 2);
+  CHECK(markers[0].text == "trial 3");
+  CHECK(markers[0].conditions == R"({"stiffness":2000.0,"surface":"felt"})");
+  CHECK(markers[1].conditions == R"({"stiffness":1500.5,"surface":"wood"})");
+  for (const RecordedEvent& marker : markers) {
+    const auto tick = std::find_if(recording.ticks.begin(), recording.ticks.end(), [&](const auto& t) {
+      return static_cast<std::int64_t>(t.tick) == marker.tick;
+    });
+    REQUIRE(tick != recording.ticks.end());
+    CHECK(tick->now_ns <= marker.time_ns);
+    CHECK((tick + 1)->now_ns > marker.time_ns);
+  }
   std::string printed;
   CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), printed) == 0);
   INFO(printed);

@@ -3,8 +3,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <wrenchd/client_error.hpp>
@@ -69,6 +71,13 @@ class Client {
   void stop() { call("stop"); }  ///< emergency stop; requires no lease
   void acknowledge() { call("acknowledge"); }
   void reinitialize_proxy() { call("reinitialize_proxy"); }
+
+  /// Value of a condition of an experiment.
+  using Condition = std::variant<double, std::string>;
+  /// Sets a marker in the running recording: mark("trial 3", {{"stiffness", 2000.0}}). A condition holds
+  /// until the next marker changes it. Throws ClientError if no recording runs, or if the marker exceeds its
+  /// bounds (see `record.mark` in describe()).
+  void mark(const std::string& label, const std::map<std::string, Condition>& conditions = {});
 
   /// Opens the shared memory that contains the state of every tick.
   StateReader open_state();

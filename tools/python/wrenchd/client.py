@@ -128,6 +128,11 @@ class Client:
             raise ProtocolError("wrenchd sent no recording; see its log")
         return os.fdopen(descriptor, "rb")
 
+    def mark(self, label, **conditions):
+        """Sets a marker in the running recording, with conditions (numbers or texts) that hold until the next marker changes
+        them: client.mark("trial 3", stiffness=2000). Returns file and time_ns. Raises Rejected if no recording runs."""
+        return self.call("record.mark", label=label, **({"conditions": conditions} if conditions else {}))
+
     # Events
 
     def subscribe(self, *names):

@@ -113,7 +113,10 @@ function showCause(now) {
     const fault = link?.status?.last_fault;
     lastFault = fault ? { cause: fault.name, t: 1e-9 * fault.time_ns } : null;
   }
-  if (mode === "recording") lastFault = lastFaultAt(now.t);
+  if (mode === "recording") {
+    lastFault = lastFaultAt(now.t);
+    showMarkerAt(now.t);
+  }
   if (lastFault) {
     const known = faults[lastFault.cause];
     const when = mode === "recording" ? `at ${lastFault.t.toFixed(2)} s` : `${ago(Math.max(now.t - lastFault.t, 0))} ago`;
@@ -172,7 +175,19 @@ function toast(text) {
 
 // --- playback of a recording ---
 
-const player = { duration: 0, t: 0, playing: false, requested: false, changes: [] };
+const player = { duration: 0, t: 0, playing: false, requested: false, changes: [], markers: [] };
+
+/** Returns a marker as one line: its label and its conditions. */
+function markerText({ label, conditions }) {
+  const set = Object.entries(conditions ?? {}).map(([name, value]) => `${name} ${value}`).join(", ");
+  return set === "" ? label : `${label} (${set})`;
+}
+
+function showMarkerAt(t) {
+  const before = player.markers.filter((one) => one.t <= t);
+  const last = before[before.length - 1];
+  set("marker", last ? `${markerText(last)}, at ${last.t.toFixed(2)} s` : "none until now");
+}
 
 function lastFaultAt(t) {
   let last = null;
@@ -187,6 +202,11 @@ function showMarks() {
     mark.dataset.state = state;
     mark.style.left = `${(100 * t) / player.duration}%`;
     mark.style.width = `${(100 * (end - t)) / player.duration}%`;
+    return mark;
+  }), ...player.markers.map((marker) => {
+    const mark = document.createElement("b");
+    mark.style.left = `${(100 * marker.t) / player.duration}%`;
+    mark.title = markerText(marker);
     return mark;
   }));
 }
@@ -227,7 +247,7 @@ const connection = new Connection({
     if (mode !== "recording") return;
     connected = true;
     rate_Hz = hello.rate_Hz;
-    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, requested: false });
+    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, markers: hello.markers, requested: false });
     $("scrub").max = hello.duration_s;
     set("play-end", `${hello.duration_s.toFixed(3)} s`);
     set("about", `${hello.name} · recorded by wrenchd ${hello.recorded_by} · ${Math.round(rate_Hz)} Hz`);
@@ -265,6 +285,7 @@ const connection = new Connection({
   },
   event({ event }) {
     if (event.name === "arming_rejected" || event.name === "reload") toast(event.text);
+    if (event.name === "marker") set("marker", markerText(event));
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
   reply({ request, accepted, error }) {
