@@ -256,8 +256,8 @@ TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "
 /// Changes a recording through libhdf5. Returns the error of reading it.
 template <class Change>
 std::string rejection_after(const TemporaryDirectory& directory, const Change& change) {
-  static int number = 0;
-  const auto file = directory.path() / ("changed" + std::to_string(++number) + ".h5");
+  const auto file = directory.path() / "changed.h5";
+  std::filesystem::remove(file);
   RandomValues random(8);
   {
     RecordingHeader header;
