@@ -356,7 +356,7 @@ TEST_CASE("a recording that refers to other files or has other types is rejected
                              [](hid_t file) {
                                H5Ldelete(file, "/contacts", H5P_DEFAULT);
                                const hsize_t none = 0;
-                               const hid_t text = H5Tcopy(H5T_C_S1), row = H5Tcreate(H5T_COMPOUND, 400);
+                               const hid_t text = H5Tcopy(H5T_C_S1), row = H5Tcreate(H5T_COMPOUND, 256);
                                H5Tset_size(text, H5T_VARIABLE);
                                std::size_t at = 0;
                                for (const RecordField& field : contact_fields())
