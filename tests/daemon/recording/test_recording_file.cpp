@@ -256,8 +256,8 @@ TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "
 /// Changes a recording through libhdf5. Returns the error of reading it.
 template <class Change>
 std::string rejection_after(const TemporaryDirectory& directory, const Change& change) {
-  static int number = 0;
-  const auto file = directory.path() / ("changed" + std::to_string(++number) + ".h5");
+  const auto file = directory.path() / "changed.h5";
+  std::filesystem::remove(file);
   RandomValues random(8);
   {
     RecordingHeader header;
@@ -359,7 +359,7 @@ TEST_CASE("a recording that refers to other files or has other types is rejected
                              [](hid_t file) {
                                H5Ldelete(file, "/contacts", H5P_DEFAULT);
                                const hsize_t none = 0;
-                               const hid_t text = H5Tcopy(H5T_C_S1), row = H5Tcreate(H5T_COMPOUND, 400);
+                               const hid_t text = H5Tcopy(H5T_C_S1), row = H5Tcreate(H5T_COMPOUND, 256);
                                H5Tset_size(text, H5T_VARIABLE);
                                std::size_t at = 0;
                                for (const RecordField& field : contact_fields())
