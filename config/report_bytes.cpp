@@ -46,7 +46,7 @@ ReportBytes parse_bytes(std::string_view text) {
 
 bool read_bytes(const TomlValue& value, std::vector<std::uint8_t>& out) {
   std::string text;
-  if (!value.text(text)) return false;
+  if (!value.paragraphs(text)) return false;
   const ReportBytes parsed = parse_bytes(text);
   if (!parsed.error.empty()) {
     value.reject("character " + std::to_string(parsed.error_index + 1) + " " + std::string(parsed.error) +

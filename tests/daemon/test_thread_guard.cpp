@@ -22,8 +22,9 @@ TEST_CASE("a step that throws ends alone, whatever it throws", "[thread_guard]")
 TEST_CASE("a task that throws does not end the worker", "[thread_guard]") {
   std::promise<void> done;
   WorkerQueue worker;
-  REQUIRE(worker.post([] { throw std::runtime_error("no memory for a scene"); }));
-  REQUIRE(worker.post([&] { done.set_value(); }));
+  constexpr uid_t kUser = 1;
+  worker.post(kUser, Role::observer, [] { throw std::runtime_error("no memory for a scene"); });
+  REQUIRE(worker.post(kUser, Role::observer, [&] { done.set_value(); }) == WorkerQueue::Posted::yes);
   done.get_future().wait();
 }
 

@@ -10,7 +10,7 @@ TEST_CASE("a marker has a label of one line, and conditions that are numbers or 
   CHECK_NOTHROW(check_marker("trial 3", Json::object()));
   CHECK_NOTHROW(check_marker("trial 3 – weich", {{"stiffness", 2000}, {"surface", "felt"}, {"_x2", -0.5}}));
   CHECK_NOTHROW(check_marker(std::string(kMarkerLabelBytes, 'x'), Json::object()));
-  for (const std::string label :
+  for (const std::string& label :
        {std::string(), std::string(kMarkerLabelBytes + 1, 'x'), std::string("two\nlines")})
     CHECK_THROWS_WITH(check_marker(label, Json::object()), Contains("one line of 1 to 120 bytes"));
   for (const std::string name : {"", "2x", "with space", "umlaut_\xc3\xa4", "x.y"})
