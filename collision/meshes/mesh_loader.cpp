@@ -127,13 +127,11 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   return use(key, loaded, {file});
 }
 
-/// Two names of one file have one key. A restricted loader follows no links, not even for the key.
+/// The name counts, not what it leads to now: a mesh that was loaded stays in use when its name becomes a
+/// link.
 MeshLoader::Key MeshLoader::key_of(const std::filesystem::path& file, BodyKind kind, bool is_file) const {
   if (!is_file) return {file, kind};
-  if (scope_.restricted()) return {std::filesystem::absolute(file).lexically_normal(), kind};
-  std::error_code error;
-  std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
-  return {error ? file : std::move(same), kind};
+  return {std::filesystem::absolute(file).lexically_normal(), kind};
 }
 
 /// Notes that the scene uses a mesh. files: the names of its files in the scene.

@@ -6,8 +6,13 @@
 #include <cstring>
 #include <type_traits>
 
+#include <hdf5.h>
+
 namespace wrenchd {
 namespace {
+
+static_assert(std::is_same_v<hid_t, std::int64_t> && std::is_same_v<herr_t, int>,
+              "as h5_handle.hpp has them");
 
 constexpr const char* kPath = "/events";
 constexpr hsize_t kChunkRows = 32;
@@ -53,20 +58,20 @@ hid_t row_type() {
   H5Tinsert(row, "time_ns", offsetof(EventRow, time_ns), H5T_NATIVE_INT64);
   H5Tinsert(row, "tick", offsetof(EventRow, tick), H5T_NATIVE_INT64);
   H5Tinsert(row, "severity", offsetof(EventRow, severity), H5T_NATIVE_UINT8);
-  const Hdf5Handle name(text_member(RecordedEvent::kNameBytes), H5Tclose);
+  const H5Handle name(text_member(RecordedEvent::kNameBytes), H5Tclose);
   H5Tinsert(row, "name", offsetof(EventRow, name), name);
-  const Hdf5Handle text(text_member(RecordedEvent::kTextBytes), H5Tclose);
+  const H5Handle text(text_member(RecordedEvent::kTextBytes), H5Tclose);
   H5Tinsert(row, "text", offsetof(EventRow, text), text);
   H5Tinsert(row, "value", offsetof(EventRow, value), H5T_NATIVE_DOUBLE);
-  const Hdf5Handle conditions(text_member(RecordedEvent::kConditionsBytes), H5Tclose);
+  const H5Handle conditions(text_member(RecordedEvent::kConditionsBytes), H5Tclose);
   H5Tinsert(row, "conditions", offsetof(EventRow, conditions), conditions);
   return row;
 }
 
 hid_t create_set(hid_t file, hid_t row) {
   const hsize_t none = 0, unlimited = H5S_UNLIMITED;
-  const Hdf5Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
-  const Hdf5Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  const H5Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
+  const H5Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_chunk(layout, 1, &kChunkRows);
   H5Pset_deflate(layout, kDeflateLevel);
   return H5Dcreate2(file, kPath, row, space, H5P_DEFAULT, layout, H5P_DEFAULT);
@@ -130,34 +135,34 @@ bool EventTable::append(std::span<const RecordedEvent> events) {
   for (const RecordedEvent& event : events) rows.push_back(to_row(event));
   const hsize_t start = rows_, count = rows.size(), total = start + count;
   if (H5Dset_extent(set_, &total) < 0) return false;
-  const Hdf5Handle in_file(H5Dget_space(set_), H5Sclose);
+  const H5Handle in_file(H5Dget_space(set_), H5Sclose);
   H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
-  const Hdf5Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const H5Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
   if (H5Dwrite(set_, row_, in_memory, in_file, H5P_DEFAULT, rows.data()) < 0) return false;
   rows_ = total;
   return true;
 }
 
 EventsRead read_events(hid_t set, std::uint64_t most_rows) {
-  const Hdf5Handle stored(H5Dget_type(set), H5Tclose);
+  const H5Handle stored(H5Dget_type(set), H5Tclose);
   if (H5Tget_class(stored) != H5T_COMPOUND) return {{}, "has no columns; name a recording of wrenchd"};
   if (H5Tget_size(stored) > 4 * sizeof(EventRow))
     return {{}, "has longer rows than a recording; the file is damaged"};
   for (const EventColumn& column : kColumns) {
     const int member = H5Tget_member_index(stored, column.name);
     if (member < 0) return {{}, "lacks a column; the file was changed, take it as it was recorded"};
-    const Hdf5Handle type(H5Tget_member_type(stored, static_cast<unsigned>(member)), H5Tclose);
+    const H5Handle type(H5Tget_member_type(stored, static_cast<unsigned>(member)), H5Tclose);
     const bool is_text = std::strcmp(column.type, "text") == 0;
     if ((H5Tget_class(type) == H5T_STRING) != is_text || (is_text && H5Tis_variable_str(type) > 0))
       return {{}, "has a column of another type; the file was changed, take it as it was recorded"};
   }
-  const Hdf5Handle space(H5Dget_space(set), H5Sclose);
+  const H5Handle space(H5Dget_space(set), H5Sclose);
   hsize_t count = 0;
   if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &count, nullptr) != 1)
     return {{}, "is not one-dimensional; the file is damaged"};
   if (count > most_rows) return {{}, "cannot have as many rows as its header states; the file is damaged"};
   std::vector<EventRow> rows(count);
-  const Hdf5Handle row(row_type(), H5Tclose);
+  const H5Handle row(row_type(), H5Tclose);
   if (count > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0)
     return {{}, "cannot be read; the file is damaged or truncated"};
   while (!rows.empty() && rows.back().name[0] == '\0') rows.pop_back();

@@ -6,9 +6,7 @@
 #include <span>
 #include <vector>
 
-#include <hdf5.h>
-
-#include "daemon/recording/hdf5_handle.hpp"
+#include "daemon/recording/h5_handle.hpp"
 #include "daemon/recording/recorded_event.hpp"
 
 namespace wrenchd {
@@ -29,15 +27,15 @@ std::span<const EventColumn> event_columns() noexcept;
 class EventTable {
  public:
   /// Creates the table in this file. ok() tells whether this succeeded.
-  explicit EventTable(hid_t file);
+  explicit EventTable(std::int64_t file);
   bool ok() const { return set_.ok(); }
-  hid_t set() const { return set_; }
+  std::int64_t set() const { return set_; }
   /// Appends the events. Returns false if HDF5 reports an error.
   bool append(std::span<const RecordedEvent> events);
 
  private:
-  Hdf5Handle row_;
-  Hdf5Handle set_;
+  H5Handle row_;
+  H5Handle set_;
   hsize_t rows_ = 0;
 };
 
@@ -48,7 +46,7 @@ struct EventsRead {
 };
 /// Reads /events, opened as `set`. Drops rows at the end that were allocated but not written when the process
 /// died. most_rows: more rows than this cannot be in the file. Not RT-safe: reads a file.
-EventsRead read_events(hid_t set, std::uint64_t most_rows);
+EventsRead read_events(std::int64_t set, std::uint64_t most_rows);
 
 /// Size of a row of /events in memory [bytes].
 std::size_t event_row_bytes() noexcept;

@@ -11,7 +11,7 @@
 #include <hdf5.h>
 
 #include "daemon/recording/event_table.hpp"
-#include "daemon/recording/hdf5_handle.hpp"
+#include "daemon/recording/h5_handle.hpp"
 #include "daemon/recording/recording_reader.hpp"
 #include "daemon/recording/recording_rows.hpp"
 #include "daemon/servo/record_fields.hpp"
@@ -92,7 +92,7 @@ hid_t type_of(FieldType type) {
   return H5T_NATIVE_DOUBLE;
 }
 
-using Handle = Hdf5Handle;
+using Handle = H5Handle;
 
 /// Stops HDF5 from printing its error stack. RecordingError carries the message instead. The exit handler of
 /// HDF5 is off: it tries to close a file again that a full disk did not let it close, and crashes.

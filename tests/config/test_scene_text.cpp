@@ -20,7 +20,7 @@ TEST_CASE("the text of a scene reads back as the same scene", "[scene_text]") {
   SceneSettings scene;
   scene.tool = {kCube, 0.001, 0.25, {}};
   scene.surface_tolerance_m = 2e-6;
-  scene.half_spaces.push_back({"table \"A\"\n\\", Vector3d(0.0, 0.6, 0.8), -0.01});
+  scene.half_spaces.push_back({"table \"A\" \\", Vector3d(0.0, 0.6, 0.8), -0.01});
   MeshObstacleSettings rest;
   rest.name = "post";
   rest.mesh = kCube;

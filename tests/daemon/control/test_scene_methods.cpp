@@ -171,7 +171,9 @@ TEST_CASE(
   CHECK(a.obstacles() == std::vector<std::string>{"table"});
   CHECK(a.ask("scene.add", add(dir.path() / "scenes/cube.off"), Role::operator_)["name"] == "block");
   // Whoever may configure reads why.
-  has(a.rejected("scene.add", add(dir.path() / "scenes/broken.off")), "sEcReT");
+  Json other = add(dir.path() / "scenes/broken.off");
+  other["obstacle"]["name"] = "other";
+  has(a.rejected("scene.add", other), "sEcReT");
 }
 
 TEST_CASE("workspace.set applies all values or none", "[scene_methods]") {

@@ -80,15 +80,15 @@ TEST_CASE("a recording without its events is rejected, and unfinished rows of ev
   const std::array events = {event(1, "state", "state: active")};
   { RecordingWriter(file, {}).append_events(events); }
   {
-    const Hdf5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
-    const Hdf5Handle set(H5Dopen2(opened, "/events", H5P_DEFAULT), H5Dclose);
+    const H5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+    const H5Handle set(H5Dopen2(opened, "/events", H5P_DEFAULT), H5Dclose);
     const hsize_t rows = 9;
     H5Dset_extent(set, &rows);
   }
   CHECK(read_recording(file).events.size() == 1);
   {
-    const Hdf5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+    const H5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
     H5Ldelete(opened, "/events", H5P_DEFAULT);
   }
-  CHECK_THROWS_WITH(read_recording(file), Contains("table 'events' is missing; name a recording of wrenchd"));
+  CHECK_THROWS_WITH(read_recording(file), Contains("has no table 'events'; name a recording of wrenchd"));
 }

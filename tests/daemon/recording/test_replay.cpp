@@ -263,5 +263,5 @@ TEST_CASE("a replay needs no file but the recording", "[replay]") {
   for (RecordedFile& f : outside.files)
     if (f.role == "tool") f.embedded = false;
   CHECK_THROWS_WITH(unpack_run_config(outside, directory.path() / "outside"),
-                    Catch::Contains("does not exist") && Catch::Contains("SHA-256"));
+                    Catch::Contains("cannot be read any more") && Catch::Contains("SHA-256"));
 }
