@@ -36,7 +36,7 @@ class EventTable {
  private:
   H5Handle row_;
   H5Handle set_;
-  hsize_t rows_ = 0;
+  std::uint64_t rows_ = 0;
 };
 
 /// Why a table of events cannot be read; null: it was read.

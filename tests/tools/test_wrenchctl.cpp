@@ -557,7 +557,7 @@ TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
       {{"check", missing}, missing + ": no such file"},
       {{"check", dir}, dir + ": is a directory; name a file in it"},
       {{"mesh", missing}, missing + ": no such file; check the path"},
-      {{"mesh", dir}, dir + ": is not a file; name an OFF, OBJ, STL or PLY file"},
+      {{"mesh", dir}, dir + ": is a directory; name a file in it"},
       {{"mesh", poses}, poses + ": unknown mesh format '.csv'; save it as .off, .obj, .stl or .ply"},
   };
   for (const auto& [arguments, expected] : table) {
@@ -625,7 +625,6 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{"mesh", "--make", "cube", "-o", ""}, "--output: must not be empty"},
       {{"mesh", mesh, "--scale", "0"}, "--scale: expected a number from 1e-09 to 1e+06, found '0'"},
       {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
-      {{"mesh", mesh, mesh}, mesh},
   };
   for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);

@@ -138,7 +138,7 @@ TEST_CASE(
   const TemporaryDirectory dir;
   const std::string secret = "root:$6$sEcReT:19000:0:99999:7:::";
   const std::filesystem::path shadow = dir.write("private/shadow", secret + "\nOFF\n");
-  dir.write("scenes/broken.off", "OFF\n" + secret + "\n");
+  dir.write("scenes/broken.off", secret + "\nOFF\n");
   dir.write("scenes/broken.toml", secret + "\n");
   std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.off");
   std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.toml");
@@ -157,7 +157,7 @@ TEST_CASE(
     CHECK(std::string(error.what()).find("sEcReT") == std::string::npos);
   };
   refuses("scene.add", add(dir.path() / "scenes/link.off"), "symbolic link");
-  refuses("scene.add", add(dir.path() / "scenes/broken.off"), "broken.off:2: is not a mesh that can be used");
+  refuses("scene.add", add(dir.path() / "scenes/broken.off"), "broken.off:1: is not a mesh that can be used");
   refuses("scene.load", {{"file", (dir.path() / "scenes/link.toml").string()}}, "symbolic link");
   refuses("scene.load", {{"file", (dir.path() / "scenes/broken.toml").string()}}, "broken.toml:1:");
   // The answer does not say whether the file exists.
