@@ -208,7 +208,7 @@ simulation.command_delay_s = [0.0002, 0.004]
         self.assertIn("wrench.law", table)
         self.assertEqual(table.count("SweepError: wrenchd: "), 4, table)
 
-        file = self.write(self.SWEEP.replace('wrench.law = ["law"]\n', "") % SOURCE)
+        file = self.write(self.SWEEP.replace('"law"', '"pid"') % SOURCE)
         bytes_of = {}
         for engine in ("serial", "2"):
             done = self.ctl(file, "--engine", engine)
