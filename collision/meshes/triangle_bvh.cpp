@@ -253,11 +253,10 @@ Halves Builder::halve(Range range, const Fitted& box, int axis) {
   return {range, at, fit({range.begin, at}), fit({at, range.end})};
 }
 
-/// Returns a measure of how many boxes of another mesh overlap the two boxes, weighted by their triangles.
-/// Boxes of half the size (x, y, z) overlap a box of half the size (a, b, c) if they are not farther apart
-/// than a + x and b + y along the surface and c + z across it. Here the other boxes are square, x = y =
-/// sqrt(a b), so that no box becomes a needle, and as thin as this one; a little more, because rounding and
-/// reach enlarge boxes.
+/// Returns a measure of how many boxes of another mesh overlap the two boxes, weighted by their triangles. A
+/// box of half the size (x, y, z) overlaps a box of half the size (a, b, c) if the two are at most a + x and
+/// b + y apart along the surface and c + z across it. The measure assumes square boxes, x = y = sqrt(a b),
+/// which makes needles expensive. For z it takes the amount by which traversals enlarge boxes.
 double Builder::overlap_cost(const Halves& halves) const {
   const auto cost = [&](const Fitted& box) {
     const double a = box.half_m[0], b = box.half_m[1], side = std::sqrt(a * b);

@@ -142,8 +142,8 @@ bool PredictiveCandidateList::build_immediately(const Pose& X_start, const Pose&
   const std::uint32_t max_visits = allowed_visits(budget);
   const bool deferrable = budget.reserved > 0;
   if (deferrable && max_visits < kMinWork_visits) return defer();
-  // A list that the budget of one tick did not suffice for continues in the next one. Otherwise every tick
-  // would spend its budget on the same beginning.
+  // If a list exceeds the budget of one tick, the next tick continues it. Otherwise every tick would spend
+  // its budget on the same part of the list.
   const bool continues = !scene_.has_moving_obstacles() && spare_->in_progress() &&
                          covered_fraction_of(*spare_, X_start, X_end) >
                              covered_fraction_of(*current_, X_start, X_end) + kMinGain;

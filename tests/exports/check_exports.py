@@ -23,7 +23,7 @@ from wrenchd.recording import RecordingError
 BIN, WORK = Path(sys.argv[1]), Path(sys.argv[2])
 READ_MCAP = sys.argv[3:]
 RUN = WORK / "run.h5"
-MARKERS = [(0.5, "trial 1", {"stiffness": 1500, "surface": "felt, soft"}), (2.25, 'trial "2"', {"stiffness": 2000.5}),
+MARKERS = [(0.5, "trial 1", {"stiffness": 1500, "surface": "rubber, soft"}), (2.25, 'trial "2"', {"stiffness": 2000.5}),
            (4.0, "trial 3 – über", {"load": -1})]
 
 
@@ -107,9 +107,9 @@ class Exports(unittest.TestCase):
 
     def test_conditions_hold_until_a_marker_changes_them(self):
         frame = self.recording.frame(["state"])
-        for t, marker, stiffness, surface, load in [(0.4, None, math.nan, None, math.nan), (0.5, "trial 1", 1500.0, "felt, soft", math.nan),
-                                                    (2.3, 'trial "2"', 2000.5, "felt, soft", math.nan),
-                                                    (4.5, "trial 3 – über", 2000.5, "felt, soft", -1.0)]:
+        for t, marker, stiffness, surface, load in [(0.4, None, math.nan, None, math.nan), (0.5, "trial 1", 1500.0, "rubber, soft", math.nan),
+                                                    (2.3, 'trial "2"', 2000.5, "rubber, soft", math.nan),
+                                                    (4.5, "trial 3 – über", 2000.5, "rubber, soft", -1.0)]:
             row = frame.iloc[np.searchsorted(frame.index, t - 1e-9)]
             self.assertEqual((row["marker"], row["surface"]), (marker, surface))
             np.testing.assert_equal((row["stiffness"], row["load"]), (stiffness, load))
@@ -272,7 +272,7 @@ class Exports(unittest.TestCase):
         self.assertEqual([data["message"] for _, data in topics["/events"]],
                          list(self.recording.events().sort_values("time_ns", kind="stable")["text"]))
         self.assertEqual(topics["/conditions"][2][1] | {"timestamp": None},
-                         {"timestamp": None, "marker": "trial 3 – über", "stiffness": 2000.5, "surface": "felt, soft", "load": -1})
+                         {"timestamp": None, "marker": "trial 3 – über", "stiffness": 2000.5, "surface": "rubber, soft", "load": -1})
 
 
 def _with(row, **changes):

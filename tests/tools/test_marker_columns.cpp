@@ -14,16 +14,16 @@ TEST_CASE("conditions hold until a marker changes them", "[export]") {
   };
   CHECK(MarkerColumns(recording).empty());
   add(20, "b", R"({"load":1})");  // markers of several clients may be stored in another order
-  add(10, "a", R"({"stiffness":2000,"surface":"felt"})");
+  add(10, "a", R"({"stiffness":2000,"surface":"rubber"})");
   add(30, "c", "");
   const MarkerColumns markers(recording);
   CHECK(markers.conditions() == std::vector<std::string>{"stiffness", "surface", "load"});
   CHECK(markers.at(9) == nullptr);
   CHECK(markers.at(10)->label == "a");
-  CHECK(markers.at(19)->values == std::vector<Json>{2000, "felt", nullptr});
-  CHECK(markers.at(20)->values == std::vector<Json>{2000, "felt", 1});
+  CHECK(markers.at(19)->values == std::vector<Json>{2000, "rubber", nullptr});
+  CHECK(markers.at(20)->values == std::vector<Json>{2000, "rubber", 1});
   CHECK(markers.at(1000)->label == "c");
-  CHECK(markers.at(1000)->values == std::vector<Json>{2000, "felt", 1});
+  CHECK(markers.at(1000)->values == std::vector<Json>{2000, "rubber", 1});
   add(40, "d", "[1]");
   CHECK_THROWS_WITH(MarkerColumns(recording), Catch::Contains("the marker 'd' are not a JSON object"));
 }

@@ -94,7 +94,7 @@ TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
         std::string::npos);
   CHECK(daemon.ctl({"status"}).out.find("recording  " + file.string()) != std::string::npos);
   std::this_thread::sleep_for(2s);
-  CHECK(daemon.ctl({"record", "mark", "trial 3", "--set", "stiffness=2000", "--set", "surface=felt"}).out ==
+  CHECK(daemon.ctl({"record", "mark", "trial 3", "--set", "stiffness=2000", "--set", "surface=rubber"}).out ==
         "marked trial 3 in " + file.string() + "\n");
   CHECK(daemon.ctl({"record", "mark", "x", "--set", "2x=1"}).err.find("letters, digits and underscores") !=
         std::string::npos);
@@ -114,7 +114,7 @@ TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
                [](const RecordedEvent& event) { return event.name == "marker"; });
   REQUIRE(markers.size() == 2);
   CHECK(markers[0].text == "trial 3");
-  CHECK(markers[0].conditions == R"({"stiffness":2000.0,"surface":"felt"})");
+  CHECK(markers[0].conditions == R"({"stiffness":2000.0,"surface":"rubber"})");
   CHECK(markers[1].conditions == R"({"stiffness":1500.5,"surface":"wood"})");
   for (const RecordedEvent& marker : markers) {
     const auto tick = std::find_if(recording.ticks.begin(), recording.ticks.end(), [&](const auto& t) {

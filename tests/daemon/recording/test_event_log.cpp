@@ -43,7 +43,7 @@ TEST_CASE("a recording has the events since its start, each with the tick in whi
   run(100);
   s.runtime.loop().requests().request(kArm);
   run(2000);
-  const auto marked = recordings.mark("trial 3", {{"stiffness", 2000}, {"surface", "felt"}});
+  const auto marked = recordings.mark("trial 3", {{"stiffness", 2000}, {"surface", "rubber"}});
   REQUIRE(marked);
   CHECK(marked->file == file);
   run(50);
@@ -69,7 +69,7 @@ TEST_CASE("a recording has the events since its start, each with the tick in whi
   CHECK(tick->state == static_cast<std::uint8_t>(State::active));
   CHECK((tick - 1)->state != static_cast<std::uint8_t>(State::active));
   const RecordedEvent marker = named("marker", "trial 3");
-  CHECK(Json::parse(marker.conditions) == Json{{"stiffness", 2000}, {"surface", "felt"}});
+  CHECK(Json::parse(marker.conditions) == Json{{"stiffness", 2000}, {"surface", "rubber"}});
   CHECK(marker.tick > active.tick);
   CHECK(marker.tick <= static_cast<std::int64_t>(recording.ticks.back().tick));
 }

@@ -8,7 +8,7 @@ using Catch::Matchers::Contains;
 
 TEST_CASE("a marker has a label of one line, and conditions that are numbers or texts", "[marker]") {
   CHECK_NOTHROW(check_marker("trial 3", Json::object()));
-  CHECK_NOTHROW(check_marker("trial 3 – weich", {{"stiffness", 2000}, {"surface", "felt"}, {"_x2", -0.5}}));
+  CHECK_NOTHROW(check_marker("trial 3 – weich", {{"stiffness", 2000}, {"surface", "rubber"}, {"_x2", -0.5}}));
   CHECK_NOTHROW(check_marker(std::string(kMarkerLabelBytes, 'x'), Json::object()));
   for (const std::string& label :
        {std::string(), std::string(kMarkerLabelBytes + 1, 'x'), std::string("two\nlines")})

@@ -45,9 +45,9 @@ struct Work {
 };
 
 struct Result {
-  Work sent;                 ///< of the sent force, in the rounds
-  Work gradient;             ///< of the force at the measured pose, in the rounds
-  double friction_J = 0.0;   ///< that the device's viscous friction dissipates in the rounds
+  Work sent;                 ///< work of the sent force during the rounds
+  Work gradient;             ///< work of the force at the measured pose during the rounds
+  double friction_J = 0.0;   ///< energy that the device's viscous friction dissipates during the rounds
   double least_share = 1.0;  ///< least ratio of the two forces
   /// Least ratio of the sent force to the largest one that is passive for every future motion, METHOD (87c).
   double least_of_possible = 1.0;
