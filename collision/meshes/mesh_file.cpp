@@ -41,7 +41,7 @@ void require_known_format(const std::filesystem::path& file) {
 [[noreturn]] void reject(const std::filesystem::path& file, const FileError& error) {
   switch (error.problem()) {
     case FileProblem::missing:
-      throw MeshError(file.string() + ": no such file; check the path in the scene");
+      throw MeshError(file.string() + ": no such file; check the path");
     case FileProblem::too_large:
       throw MeshError(file.string() + ": is larger than 1 GiB; simplify the mesh");
     default:

@@ -198,7 +198,7 @@ void check_refused(const std::vector<Bad>& table) {
 TEST_CASE("a file that is no mesh is rejected with its name and a remedy") {
   const TemporaryDirectory dir;
   CHECK(rejection_text(dir.path() / "missing.off") ==
-        (dir.path() / "missing.off").string() + ": no such file; check the path in the scene");
+        (dir.path() / "missing.off").string() + ": no such file; check the path");
   fs::create_directory(dir.path() / "folder.off");
   CHECK(rejection_text(dir.path() / "folder.off").find("is a directory; name a file in it") !=
         std::string::npos);
