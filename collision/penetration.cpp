@@ -137,6 +137,12 @@ void PenetrationDepth::clear_history(double scene_time_s) noexcept {
   if (proxy_) proxy_->clear_history(scene_time_s);
 }
 
+void PenetrationDepth::discard_contacts() noexcept {
+  warm_start_.clear();
+  X_last_answer_.reset();
+  if (proxy_) proxy_->discard_contacts();
+}
+
 Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& stop,
                                     double scene_time_s) noexcept {
   clear_history(scene_time_s);

@@ -76,6 +76,9 @@ class PenetrationDepth {
   /// scene_time_s [s]. RT-safe.
   void clear_history(double scene_time_s = 0.0) noexcept;
 
+  /// Discards the contacts of the last follow(), whose answer is not the X_last of the next one. RT-safe.
+  void discard_contacts() noexcept;
+
   /// Returns true if contacts with mesh obstacles number mesh features, false if they number features of the
   /// convex hulls. RT-safe.
   bool uses_mesh_features() const noexcept { return proxy_.has_value(); }

@@ -61,6 +61,10 @@ class Proxy {
   /// Clears the contacts of the last tick. The next X_last must be admissible at time_s [s]. RT-safe.
   void clear_history(double time_s = 0.0) noexcept;
 
+  /// Discards the known contacts: the next X_last is admissible, but not the answer of the last follow().
+  /// RT-safe.
+  void discard_contacts() noexcept { known_contacts_.clear(); }
+
   double admissible_time_s() const noexcept {
     return admissible_time_s_;
   }  ///< scene time at which q is admissible [s]

@@ -43,10 +43,12 @@ class UndrivenMotion {
   void set_share(double share) noexcept { share_ = share; }
 
   /// Follows the measured pose X_BH of a new sample, taken at device_time_s. `render(X)` moves the rendering
-  /// to handle pose X and returns its SpringState; the step calls it one to four times, the last time with
-  /// the pose that it returns.
-  template <class Render>
-  Pose follow(const Pose& X_BH, double device_time_s, Render&& render) noexcept {
+  /// to handle pose X and returns its SpringState. `undo()` puts the rendering back to where it was before
+  /// the last render(), its proxy included: a proxy that returned to the same handle pose by itself could
+  /// arrive at another place with more energy. At the end the rendering is at the pose that the function
+  /// returns.
+  template <class Render, class Undo>
+  Pose follow(const Pose& X_BH, double device_time_s, Render&& render, Undo&& undo) noexcept {
     move_driven(X_BH, device_time_s);
     SpringState at = render(X_BH_used_);
     for (int attempt = 0; attempt < 2; ++attempt) {
@@ -57,13 +59,16 @@ class UndrivenMotion {
         at = there;
         break;
       }
-      const SpringState before = at;
-      at = render(X_BH_used_);
-      account_J_ -= share_ * (at.U_J - before.U_J);  // the proxy may return to another place
+      undo();
       if (!whole_) break;
     }
     finish(at);
     return X_BH_used_;
+  }
+  /// The same for a rendering whose state depends on the handle pose alone, so that nothing is to be undone.
+  template <class Render>
+  Pose follow(const Pose& X_BH, double device_time_s, Render&& render) noexcept {
+    return follow(X_BH, device_time_s, render, [] {});
   }
 
   /// Takes the measured pose at once, with an empty account. For a handle that no contact holds.

@@ -2,6 +2,7 @@
 #include "daemon/servo/renderer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/finite.hpp"
 #include "core/state_machine.hpp"
@@ -147,11 +148,18 @@ ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdic
 /// obstacles trap a proxy.
 bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept {
   bool first = true, kept = true;
+  Pose X_BH_now, X_BH_before;
   const auto move = [&](const Pose& X_BH) {
     const Pose X_WH = workspace_.update(X_BH, first ? t.dt_s : 0.0);
     if (first && stability_.set_workspace_scale(workspace_.scale())) scale_renderings();
     kept = (first ? crossfade_.project(X_WH, t.now, t.scene_time_s) : crossfade_.move(X_WH)) && kept;
     first = false;
+    X_BH_before = std::exchange(X_BH_now, X_BH);
+  };
+  const auto undo = [&] {
+    crossfade_.undo_move();
+    X_BH_now = X_BH_before;
+    workspace_.update(X_BH_now, 0.0);
   };
   const bool held = active().proxy_initialization() == ProxyInitialization::complete;
   if (!undriven_.active() || !held) {
@@ -160,10 +168,11 @@ bool Renderer::follow_driven(const DeviceSample& sample, double sent_share, cons
     return kept;
   }
   undriven_.set_share(contact_gain_ * sent_share);
-  undriven_.follow(sample.X_BH, sample.device_time_s, [&](const Pose& X_BH) {
+  const auto render = [&](const Pose& X_BH) {
     move(X_BH);
     return spring_state();
-  });
+  };
+  undriven_.follow(sample.X_BH, sample.device_time_s, render, undo);
   return kept;
 }
 

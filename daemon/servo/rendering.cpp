@@ -100,6 +100,9 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
 }
 
 bool Rendering::move(const Pose& X_WH) noexcept {
+  X_WP_before_ = X_WP_;
+  X_WQ_before_ = X_WQ_;
+  depth_before_ = depth_;
   X_WP_ = X_WH * X_HT_;
   if (proxy_initialization_ != ProxyInitialization::complete) return true;
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
@@ -107,6 +110,13 @@ bool Rendering::move(const Pose& X_WH) noexcept {
     return false;
   X_WQ_ = depth_.projection.X_WQ;
   return true;
+}
+
+void Rendering::undo_move() noexcept {
+  X_WP_ = X_WP_before_;
+  X_WQ_ = X_WQ_before_;
+  depth_ = depth_before_;
+  penetration_.discard_contacts();
 }
 
 Wrench Rendering::spring_F_T() const noexcept {

@@ -40,6 +40,8 @@ class Rendering {
   /// Moves p of this tick to another handle pose, and q after it; the obstacles stay as in the last
   /// project(). Returns false if no admissible pose is left. Does nothing without a valid proxy. RT-safe.
   bool move(const Pose& X_WH) noexcept;
+  /// Puts p and q back to where they were before the last move(). RT-safe.
+  void undo_move() noexcept;
   /// Computes the body wrench for the poses of the last project(). dt_s: device time since the last call.
   /// RT-safe.
   void compute_wrench(double dt_s) noexcept;
@@ -111,6 +113,8 @@ class Rendering {
   Pose X_WQ_;
   Pose X_WP_;
   Penetration depth_;
+  Pose X_WP_before_, X_WQ_before_;  ///< Before the last move().
+  Penetration depth_before_;
   Wrench F_T_;
   double scene_time_s_ = 0.0;         ///< Scene time at which depth_ was computed.
   double obstacle_work_kg_m2_ = 0.0;  ///< Change of T by moving obstacles in the last tick [kg m^2].

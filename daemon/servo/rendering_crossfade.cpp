@@ -38,6 +38,11 @@ bool RenderingCrossfade::move(const Pose& X_WH) noexcept {
   return (!next_ || next_->move(X_WH)) && kept;
 }
 
+void RenderingCrossfade::undo_move() noexcept {
+  active_->undo_move();
+  if (next_) next_->undo_move();
+}
+
 void RenderingCrossfade::compute_wrench(double dt_s) noexcept {
   active_->compute_wrench(dt_s);
   if (next_) next_->compute_wrench(dt_s);

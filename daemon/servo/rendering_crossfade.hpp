@@ -48,6 +48,8 @@ class RenderingCrossfade {
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
   /// Moves p of this tick to another handle pose in both renderings. Returns false if a proxy is trapped.
   bool move(const Pose& X_WH) noexcept;
+  /// Undoes the last move() of both renderings. RT-safe.
+  void undo_move() noexcept;
   /// Calls Rendering::compute_wrench() for both renderings.
   void compute_wrench(double dt_s) noexcept;
 

@@ -96,8 +96,12 @@ Ledger go_round(UndrivenMotion& undriven, DofMask drives, bool forward, double& 
     const double t_s = i * kTick_s;
     Pose X = on_loop(std::max(t_s, 0.0), forward);
     X.translation_m.z() += 0.02 * std::max(-2.0 * t_s, 0.0);
-    SpringState last;
-    undriven.follow(X, t_s, [&](const Pose& at) { return last = stick_on_floor(at); });
+    SpringState last, before;
+    const auto render = [&](const Pose& at) {
+      before = last;
+      return last = stick_on_floor(at);
+    };
+    undriven.follow(X, t_s, render, [&] { last = before; });
     ledger.add(X, last.F_B);
     const double whole_N = stick_on_floor(X).F_B.force_N.norm();
     if (i > 0 && whole_N > 0.0) min_share = std::min(min_share, last.F_B.force_N.norm() / whole_N);
@@ -203,6 +207,28 @@ TEST_CASE("undriven motion waits while the potential is not known", "[undriven]"
   CHECK(undriven.lag_rad() == Approx(0.1));
   undriven.follow(X, 2e-3, stick_on_floor);
   CHECK(undriven.lag_rad() < 1e-12);
+}
+
+// A proxy that follows a rotation round an edge does not come back by the same way: at the old pose it is on
+// the other side of the edge, with a loaded spring.
+TEST_CASE("a rotation that costs too much leaves no trace", "[undriven]") {
+  UndrivenMotion undriven = device(kAllDofs, kLinearDofs);
+  bool round_the_edge = false, before = false;
+  const auto render = [&](const Pose& at) {
+    before = round_the_edge;
+    round_the_edge = round_the_edge || rotation_vector(at.rotation).norm() > 0.2;
+    SpringState spring;
+    spring.U_J = round_the_edge ? 0.05 : 0.0;
+    return spring;
+  };
+  const auto undo = [&] { round_the_edge = before; };
+  Pose X;
+  undriven.follow(X, 0.0, render, undo);
+  X.rotation = rotation_from({0.0, 0.5, 0.0});
+  undriven.follow(X, kTick_s, render, undo);
+  CHECK_FALSE(round_the_edge);
+  CHECK(undriven.account_J() >= 0.0);
+  CHECK(undriven.lag_rad() > 0.2);
 }
 
 TEST_CASE("no energy counts while no force reaches the hand", "[undriven]") {

@@ -283,11 +283,19 @@ class Host {
       device_s_ = report.device_s;
       sampled_ = true;
       bool moved = false;
-      undriven_.follow(report.X_BH, report.device_s, [&](const Pose& X_WH) {
+      const auto move = [&](const Pose& X_WH) {
+        before_ = {X_WQ_, F_, in_contact_};
         const SpringState spring = render(X_WH, moved ? 0.0 : dt_s);
         moved = true;
         return spring;
-      });
+      };
+      const auto undo = [&] {
+        X_WQ_ = before_.X_WQ;
+        F_ = before_.F;
+        in_contact_ = before_.in_contact;
+        depth_.discard_contacts();
+      };
+      undriven_.follow(report.X_BH, report.device_s, move, undo);
       F_ = restrict_to_dofs(F_, options_.drives);
     }
     Wrench F = F_;
@@ -340,6 +348,11 @@ class Host {
   Pose X_WQ_;
   Wrench F_;
   bool in_contact_ = false;
+  struct {
+    Pose X_WQ;
+    Wrench F;
+    bool in_contact = false;
+  } before_;  ///< before the last rendering
   bool sampled_ = false;
   double device_s_ = 0.0;
 };
