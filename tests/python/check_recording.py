@@ -65,7 +65,9 @@ with h5py.File(sys.argv[1], "r") as file:
 
     # The events of the loop name the tick in which they happened.
     changes = events[:][events["name"] == b"state"]
-    check("changes of the state are events", b"state: active" in set(changes["text"]))
+    of_ticks = state[:]
+    entered = {names[number] for number in of_ticks[1:][np.diff(of_ticks.astype(int)) != 0]}
+    check("changes of the state are events", {b"state: " + name.encode() for name in entered} <= set(changes["text"]))
     for row in changes[changes["tick"] >= 0]:
         at = np.flatnonzero(ticks["tick"] == row["tick"])
         check("an event has the tick of its time", len(at) and row["time_ns"] == ticks["now_ns"][at[0]])
