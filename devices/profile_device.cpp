@@ -156,9 +156,18 @@ DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   return sample_;
 }
 
-/// The first read discards the reports that waited since open(). The time of silence starts here.
+/// The first read discards the reports that waited since open(). The time of silence starts here. All must
+/// go: while the daemon starts, more arrive than one read processes, the link drops what its buffer cannot
+/// hold, and the gap would count as lost reports. The limit is for a device that sends faster than this loop
+/// reads.
 void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
-  drain(now);
+  constexpr int kMaxDiscardedReports = 16 * kMaxReportsPerRead;
+  std::array<std::uint8_t, kMaxReportBytes> buffer;
+  for (int i = 0; i < kMaxDiscardedReports && !disconnected_ && open_; ++i) {
+    const LinkStatus status = link_.read(now, buffer).status;
+    disconnected_ = status == LinkStatus::disconnected;
+    if (status != LinkStatus::ok) break;
+  }
   sample_ = {};
   sample_.sensed_dofs = sensed_dofs(profile_);
   sample_.driven_dofs = driven_dofs(profile_);

@@ -268,6 +268,21 @@ TEST_CASE("the first read discards waiting reports") {
   CHECK(sample.fault == Fault::none);
 }
 
+TEST_CASE(
+    "the first read discards more reports than one read processes, so a gap behind them is not a loss") {
+  Bench bench;
+  bench.device.open();
+  for (int i = 0; i < 280; ++i) bench.push();
+  CHECK_FALSE(bench.device.read_newest(bench.now).fresh);
+  CHECK(bench.link.reports.empty());
+  bench.report.sequence += 100;  // what the full buffer of the link dropped
+  bench.report.device_time += 100'000;
+  bench.now += 100ms;
+  const DeviceSample sample = bench.step();
+  CHECK(sample.fresh);
+  CHECK(sample.missing == 0);
+}
+
 TEST_CASE("a device that restarts its counters is accepted after stale_fault_s") {
   Bench bench;
   bench.report.sequence = 5000;
