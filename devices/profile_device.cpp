@@ -156,10 +156,10 @@ DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   return sample_;
 }
 
-/// The first read discards the reports that waited since open(). The time of silence starts here. All must
-/// go: while the daemon starts, more arrive than one read processes, the link drops what its buffer cannot
-/// hold, and the gap would count as lost reports. The limit is for a device that sends faster than this loop
-/// reads.
+/// The first read discards all reports that waited since open(), not only as many as later reads process: if
+/// the buffer of the link has overflowed since open(), the dropped reports would count as missing. The limit
+/// bounds the time of this read if a device sends faster than the host reads. The time of silence starts
+/// here.
 void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
   constexpr int kMaxDiscardedReports = 16 * kMaxReportsPerRead;
   std::array<std::uint8_t, kMaxReportBytes> buffer;
