@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <spdlog/spdlog.h>
 
+#include "tests/support/paths.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -36,7 +37,7 @@ int main(int argc, char** argv) {
   const wrenchd::test::TemporaryDirectory state;
   setenv("XDG_STATE_HOME", state.path().c_str(), 1);
   const char* const cache = std::getenv("WRENCHD_TEST_CACHE");
-  setenv("XDG_CACHE_HOME", cache ? cache : WRENCHD_BINARY_DIR "/../tests/cache", 1);
+  setenv("XDG_CACHE_HOME", cache ? cache : wrenchd::test::program_path("../tests/cache").c_str(), 1);
   spdlog::default_logger()->set_level(spdlog::level::off);
   return Catch::Session().run(argc, argv);
 }

@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 
 namespace wrenchd {
@@ -61,8 +62,8 @@ TEST_CASE("the cost by mesh size is written cell by cell and plotted", "[growth]
     return;
   }
   const auto svg = files.path() / "growth.svg";
-  const std::string draw = "gnuplot -c " WRENCHD_SOURCE_DIR "/tests/bench/growth.gp " + csv.string() + " " +
-                           svg.string() + " 2> " + (files.path() / "said").string();
+  const std::string draw = "gnuplot -c " + test::source_path("tests/bench/growth.gp") + " " + csv.string() +
+                           " " + svg.string() + " 2> " + (files.path() / "said").string();
   REQUIRE(std::system(draw.c_str()) == 0);
   std::ifstream drawn(svg);
   const std::string picture{std::istreambuf_iterator<char>(drawn), {}};

@@ -11,6 +11,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
 
-const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
+const fs::path kConfig = test::source_path("config");
 const SearchPath kShipped({kConfig});
 
 std::string text_of(const fs::path& file) {

@@ -10,6 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 using test::TemporaryDirectory;
 using test::with;
 
-const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
+const fs::path kConfig = test::source_path("config");
 
 std::string text_of(const fs::path& file) {
   std::ifstream stream(file);

@@ -3,6 +3,7 @@
 
 #include "config/inherited_toml.hpp"
 #include "config/load_profile.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -12,7 +13,7 @@ using test::TemporaryDirectory;
 
 namespace {
 
-const std::string kLoopback = WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml";
+const std::string kLoopback = test::source_path("config/profiles/loopback.toml");
 
 std::string inheriting(const std::string& parent, const std::string& more = "") {
   return "inherits = \"" + parent + "\"\n" + more;
@@ -31,7 +32,7 @@ std::string rejection_text(const std::filesystem::path& file, const SearchPath& 
 
 TEST_CASE("a profile overrides its parent key by key", "[inherited_toml]") {
   const TemporaryDirectory dir;
-  const SearchPath search({dir.path() / "etc", WRENCHD_SOURCE_DIR "/config"});
+  const SearchPath search({dir.path() / "etc", test::source_path("config")});
   const auto file =
       dir.write("etc/profiles/mine.toml", inheriting("loopback",
                                                      "name = 'mine'\n[limits]\nmax_force_N = 3.0\n"
@@ -50,7 +51,7 @@ TEST_CASE("a profile overrides its parent key by key", "[inherited_toml]") {
 
 TEST_CASE("in a chain of parents the nearest value applies", "[inherited_toml]") {
   const TemporaryDirectory dir;
-  const SearchPath search({dir.path(), WRENCHD_SOURCE_DIR "/config"});
+  const SearchPath search({dir.path(), test::source_path("config")});
   dir.write("profiles/a.toml",
             inheriting("loopback", "name = 'a'\ndescription = 'of a'\nwatchdog_s = 0.02\n"));
   dir.write("profiles/b.toml", inheriting("a", "name = 'b'\nwatchdog_s = 0.03\n"));
@@ -62,7 +63,7 @@ TEST_CASE("in a chain of parents the nearest value applies", "[inherited_toml]")
 
 TEST_CASE("the administrator's file may inherit the package's file of the same name", "[inherited_toml]") {
   const TemporaryDirectory dir;
-  const SearchPath search({dir.path() / "etc", WRENCHD_SOURCE_DIR "/config"});
+  const SearchPath search({dir.path() / "etc", test::source_path("config")});
   const auto file =
       dir.write("etc/profiles/loopback.toml", inheriting("loopback", "[limits]\nmax_force_N = 1.0\n"));
   CHECK(load_profile(file, search).max_force_N == 1.0);
@@ -98,7 +99,7 @@ TEST_CASE("a missing or unnamed parent is rejected", "[inherited_toml]") {
 
 TEST_CASE("defects of a parent are reported with their location in the parent", "[inherited_toml]") {
   const TemporaryDirectory dir;
-  const SearchPath search({dir.path(), WRENCHD_SOURCE_DIR "/config"});
+  const SearchPath search({dir.path(), test::source_path("config")});
   const auto parent = dir.write("profiles/a.toml", inheriting("loopback", "name = 'a'\nwatchdog_s = 7\n"));
   const auto child = dir.write("profiles/b.toml", inheriting("a", "name = ''\n"));
   const std::string message = rejection_text(child, search);

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/known_profiles.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -9,7 +10,7 @@ namespace {
 
 using namespace test;
 
-const std::filesystem::path kConfig = WRENCHD_SOURCE_DIR "/config";
+const std::filesystem::path kConfig = test::source_path("config");
 
 TEST_CASE("every shipped profile is listed under the name of its file", "[known_profiles]") {
   const SearchPath shipped({kConfig});

@@ -14,6 +14,7 @@
 #include "devices/profile_device.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;
@@ -36,7 +37,7 @@ void check_same(const ReportBit& a, const ReportBit& b) {
   CHECK(a.bit == b.bit);
 }
 
-const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
+const SearchPath kShipped({test::source_path("config")});
 
 std::vector<DeviceProfile> all_shipped() {
   std::vector<DeviceProfile> profiles;
@@ -80,7 +81,7 @@ TEST_CASE("no id belongs to two shipped profiles that are selected automatically
 TEST_CASE("each shipped profile senses and drives what its device does", "[profiles]") {
   const auto dofs = [](const char* name) {
     const DeviceProfile p =
-        load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml", kShipped);
+        load_profile(test::source_path("config/profiles/") + std::string(name) + ".toml", kShipped);
     return std::pair(dof_text(sensed_dofs(p)), dof_text(driven_dofs(p)));
   };
   using Pair = std::pair<std::string, std::string>;
@@ -97,7 +98,7 @@ TEST_CASE("the reference profiles have the report format of the loopback device 
           "[profiles]") {
   for (const char* name : {"reference_full_speed", "reference_high_speed"}) {
     const DeviceProfile p =
-        load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml", kShipped);
+        load_profile(test::source_path("config/profiles/") + std::string(name) + ".toml", kShipped);
     check_same(p.pose_report.position, reference_profile().pose_report.position);
     check_same(p.wrench_report.torque, reference_profile().wrench_report.torque);
     CHECK(p.pose_report.checksum == Checksum::crc16_ccitt_false);
@@ -105,7 +106,7 @@ TEST_CASE("the reference profiles have the report format of the loopback device 
 }
 
 TEST_CASE("the other devices in the example are valid profiles", "[profiles]") {
-  std::ifstream example(WRENCHD_SOURCE_DIR "/config/profiles/example.toml");
+  std::ifstream example(test::source_path("config/profiles/example.toml"));
   std::vector<std::string> blocks;
   for (std::string line; std::getline(example, line);) {
     if (!line.starts_with("#| ")) continue;
@@ -123,7 +124,7 @@ TEST_CASE("the other devices in the example are valid profiles", "[profiles]") {
 }
 
 TEST_CASE("the shipped loopback profile is the reference report layout", "[profiles]") {
-  const DeviceProfile file = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
+  const DeviceProfile file = load_profile(test::source_path("config/profiles/loopback.toml"));
   const DeviceProfile code = reference_profile();
   const PoseReportLayout& p = file.pose_report;
   const PoseReportLayout& q = code.pose_report;
@@ -158,7 +159,7 @@ TEST_CASE("the shipped loopback profile is the reference report layout", "[profi
 
 TEST_CASE("a profile may state additional limits and the meaning of its buttons", "[profiles]") {
   const auto load = [](const std::string& name) {
-    return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
+    return load_profile(test::source_path("config/profiles/") + name + ".toml", kShipped);
   };
   const DeviceProfile example = load("example");
   CHECK(example.workspace_radius_m == 0.3);
@@ -192,9 +193,9 @@ TEST_CASE("a profile may state additional limits and the meaning of its buttons"
 }
 
 TEST_CASE("the shipped hands stay inside the loopback's workspace", "[profiles]") {
-  const DeviceProfile p = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml", kShipped);
+  const DeviceProfile p = load_profile(test::source_path("config/profiles/loopback.toml"), kShipped);
   int hands = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(WRENCHD_SOURCE_DIR "/config/hands")) {
+  for (const auto& entry : std::filesystem::directory_iterator(test::source_path("config/hands"))) {
     SimulationSettings hand;
     load_hand_script(entry.path(), hand);
     INFO(entry.path());

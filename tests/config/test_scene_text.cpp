@@ -4,6 +4,7 @@
 #include "config/load_scene.hpp"
 #include "config/scene_text.hpp"
 #include "config/toml_file.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd {
 namespace {
@@ -14,7 +15,7 @@ SceneSettings read_back(const std::string& text) {
   return load_scene(read_toml_text(text, "/scene.toml"), "/scene.toml");
 }
 
-const std::string kCube = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
+const std::string kCube = test::source_path("config/meshes/cube.off");
 
 TEST_CASE("the text of a scene reads back as the same scene", "[scene_text]") {
   SceneSettings scene;

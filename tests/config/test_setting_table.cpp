@@ -9,13 +9,14 @@
 #include "config/load_settings.hpp"
 #include "config/setting_table.hpp"
 #include "config/toml_file.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd {
 namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
+const fs::path kConfig = test::source_path("config");
 const SearchPath kShipped({kConfig});
 
 bool is_section(std::string_view name) {

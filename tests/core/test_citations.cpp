@@ -14,6 +14,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/paths.hpp"
+
 // Checks the citations of the tree: METHOD (22) and sections of core/METHOD.md, Eq. (8) and sections of the
 // paper, names of Markdown files, links of the guides.
 
@@ -21,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kSource = WRENCHD_SOURCE_DIR;
+const fs::path kSource = test::source_path();
 constexpr const char* kThisFile = "tests/core/test_citations.cpp";
 
 std::string read(const fs::path& file) {

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/options.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd {
 namespace {
@@ -24,7 +25,7 @@ Options parse(std::vector<std::string> words) {
 
 /// Options with the shipped configuration.
 Options shipped(std::vector<std::string> words = {}) {
-  words.insert(words.end(), {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml"});
+  words.insert(words.end(), {"--config", test::source_path("config/wrenchd.toml")});
   return parse(std::move(words));
 }
 

@@ -18,6 +18,7 @@
 #include <wrenchd/client.hpp>
 
 #include "daemon/recording/recording_file.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // The daemon with standard streams that are closed, that nobody reads any more, or that somebody has stopped
@@ -29,7 +30,7 @@ namespace {
 using namespace test;
 using Catch::Contains;
 
-constexpr const char* kProgram = WRENCHD_BINARY_DIR "/wrenchd";
+const std::string kProgram = test::program_path("wrenchd");
 constexpr const char* kReleased = "the hand is released: zero wrench, motors off";
 
 std::string contents(const std::filesystem::path& file) {
@@ -79,7 +80,7 @@ class Daemon {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
-    REQUIRE(posix_spawn(&pid_, kProgram, &actions, nullptr, words.data(), environ) == 0);
+    REQUIRE(posix_spawn(&pid_, kProgram.c_str(), &actions, nullptr, words.data(), environ) == 0);
     posix_spawn_file_actions_destroy(&actions);
   }
   ~Daemon() {
@@ -148,8 +149,8 @@ TEST_CASE("a reader of the live line that leaves does not end wrenchd", "[stream
 TEST_CASE("with its standard streams closed wrenchd writes nothing else into its recording", "[streams]") {
   const TemporaryDirectory files;
   const auto file = files.path() / "run.h5";
-  CHECK(shell(std::string("exec ") + kProgram + " --virtual-time --seconds 3 --arm --live --record " +
-              file.string() + " 0<&- 1>&- 2>&-") == 0);
+  CHECK(shell("exec " + kProgram + " --virtual-time --seconds 3 --arm --live --record " + file.string() +
+              " 0<&- 1>&- 2>&-") == 0);
   CHECK(read_recording(file).ticks.size() >= 3000);
   CHECK(contents(file).find("contacts | F") == std::string::npos);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <catch2/catch.hpp>
 
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_meshes.hpp"
 
@@ -128,7 +129,7 @@ TEST_CASE("wrenchd rejects invalid files with their location, and starts nothing
   const std::string box_off = as_off(box({0, 0, 0}, {1, 1, 1}));
   dir.write("body.off", box_off);
   dir.write("open.off", as_off({box({0, 0, 0}, {1, 1, 1}).vertices, {{0, 4, 6, 2}}}));
-  const auto profile = contents(fs::path(WRENCHD_SOURCE_DIR) / "config/profiles/loopback.toml");
+  const auto profile = contents(test::source_path("config/profiles/loopback.toml"));
   const auto file = [&](const std::string& name, const std::string& text) {
     return dir.write(name, text).string();
   };

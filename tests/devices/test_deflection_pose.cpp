@@ -12,6 +12,7 @@
 #include "devices/links/simulated_link.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_recorder.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -63,8 +64,8 @@ Pose pose_in(const std::array<double, 7>& x) {
 /// z down.
 struct Steered {
   explicit Steered(RunConfig shipped = shipped_config()) : plan(std::move(shipped)) {
-    plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_combined.toml",
-                                SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+    plan.profile = load_profile(test::source_path("config/profiles/spacemouse_combined.toml"),
+                                SearchPath({test::source_path("config")}));
     runtime.emplace(plan, link, clock, ProxySearchMode::in_tick);
     runtime->open();
   }
@@ -372,8 +373,8 @@ TEST_CASE("steering does not allocate or lock", "[deflection_pose][realtime]") {
 TEST_CASE("the simulated hand observes the displayed tool and steers it along its path",
           "[deflection_pose][simulation]") {
   RunConfig plan = shipped_config();
-  plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_split.toml",
-                              SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  plan.profile = load_profile(test::source_path("config/profiles/spacemouse_split.toml"),
+                              SearchPath({test::source_path("config")}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
   Runtime runtime(plan, *link, clock, ProxySearchMode::in_tick);

@@ -7,13 +7,14 @@
 
 #include "config/load_profile.hpp"
 #include "devices/kinematics.hpp"
+#include "tests/support/paths.hpp"
 
 using namespace wrenchd;
 
 namespace {
 
 Kinematics shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml").kinematics;
+  return load_profile(test::source_path("config/profiles/") + name + ".toml").kinematics;
 }
 
 const Kinematics kPolhem = shipped("polhem");

@@ -5,6 +5,7 @@
 #include "devices/layout_check.hpp"
 #include "devices/profile_reports.hpp"
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
@@ -165,7 +166,7 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
   const auto differ = [&](const char* name, const Bytes& descriptor) {
     return find_differences(
         parsed(descriptor),
-        expected_reports(load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name))));
+        expected_reports(load_profile(test::source_path("config/profiles/") + std::string(name))));
   };
   CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == Lines{});
   CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == Lines{});
@@ -180,7 +181,7 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
 }
 
 TEST_CASE("wrenchctl check --against prints the required changes", "[layout_check]") {
-  const std::string profile = WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml";
+  const std::string profile = test::source_path("config/profiles/loopback.toml");
   const TemporaryDirectory dir;
   const auto check = [&](const std::string& file, const std::string& descriptor) {
     const auto source = dir.write("descriptor.txt", descriptor);
@@ -203,7 +204,7 @@ TEST_CASE("wrenchctl check --against prints the required changes", "[layout_chec
                        "  input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the "
                        "device's report ends with byte 62\n");
 
-  const ProgramResult scene = check(WRENCHD_SOURCE_DIR "/config/scenes/cube_on_table.toml", kReference);
+  const ProgramResult scene = check(test::source_path("config/scenes/cube_on_table.toml"), kReference);
   CHECK(scene.exit_code == 1);
   CHECK(scene.err.find("cube_on_table.toml") != std::string::npos);
   const ProgramResult broken = check(profile, "05 01 c0");

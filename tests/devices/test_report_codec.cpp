@@ -11,6 +11,7 @@
 #include <catch2/catch.hpp>
 
 #include "devices/report_codec.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/report_round_trip.hpp"
 
 using namespace wrenchd;
@@ -19,7 +20,7 @@ namespace {
 
 /// Returns devices/README.md with single blanks between words.
 std::string readme() {
-  std::ifstream file(std::filesystem::path(WRENCHD_SOURCE_DIR) / "devices/README.md");
+  std::ifstream file(test::source_path("devices/README.md"));
   std::string text, word;
   while (file >> word) text += word + ' ';
   return text;

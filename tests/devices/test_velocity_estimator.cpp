@@ -11,6 +11,7 @@
 #include "devices/simulation/reference_profile.hpp"
 #include "devices/velocity_estimator.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 
 namespace wrenchd {
@@ -21,8 +22,8 @@ using namespace std::chrono_literals;
 using Kind = SimulatedFault::Kind;
 
 DeviceProfile shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml",
-                      SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  return load_profile(test::source_path("config/profiles/") + name + ".toml",
+                      SearchPath({test::source_path("config")}));
 }
 
 /// A profile like the reference layout whose reports have no velocity.

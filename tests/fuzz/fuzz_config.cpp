@@ -27,6 +27,7 @@
 #include "devices/profile_device.hpp"
 #include "tests/fuzz/feed.hpp"
 #include "tests/fuzz/memory_link.hpp"
+#include "tests/support/paths.hpp"
 
 // Reads any text as each kind of configuration file. The loader throws ConfigError with a location inside the
 // text, or returns values that satisfy its postconditions.
@@ -71,7 +72,7 @@ class ScratchFile {
 };
 
 const SearchPath& shipped() {
-  static const SearchPath search({WRENCHD_SOURCE_DIR "/config"});
+  static const SearchPath search({test::source_path("config")});
   return search;
 }
 

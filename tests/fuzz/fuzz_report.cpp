@@ -13,6 +13,7 @@
 #include "devices/profile_device.hpp"
 #include "tests/fuzz/feed.hpp"
 #include "tests/fuzz/memory_link.hpp"
+#include "tests/support/paths.hpp"
 
 // Reports, pauses, commands and lost links in any order, for each shipped profile, over a link in memory. For
 // every order the sample is a valid pose, counters and clocks never decrease, and no command exceeds the
@@ -24,7 +25,7 @@ using namespace wrenchd;
 using namespace wrenchd::test;
 
 const std::vector<DeviceProfile>& profiles() {
-  static const KnownProfiles known = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  static const KnownProfiles known = known_profiles(SearchPath({test::source_path("config")}));
   require(known.rejected.empty() && !known.profiles.empty(), "every shipped profile is valid");
   return known.profiles;
 }

@@ -22,6 +22,7 @@
 #include "tests/fuzz/fuzz_mesh.hpp"
 #include "tests/fuzz/fuzz_recording.hpp"
 #include "tests/fuzz/fuzz_report.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/recording_mutation.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/support/sample_meshes.hpp"
@@ -36,7 +37,7 @@ using namespace wrenchd;
 using namespace wrenchd::test;
 namespace fs = std::filesystem;
 
-const fs::path kConfig = WRENCHD_SOURCE_DIR "/config";
+const fs::path kConfig = test::source_path("config");
 
 struct Seeds {
   std::vector<std::string> inputs;

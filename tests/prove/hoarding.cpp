@@ -16,6 +16,7 @@
 #include "daemon/control/control_socket.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "tests/prove/abused_daemon.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/recording_mutation.hpp"
 
 namespace wrenchd::test {
@@ -230,7 +231,7 @@ void end_during_mesh(Daemon& daemon, const fs::path& config, Hoarding& result) {
 Hoarding hoard(const std::string& program, const fs::path& directory) {
   Hoarding result;
   const fs::path socket = directory / "hoarded.sock", config = directory / "conf/wrenchd.toml";
-  const std::string shipped = WRENCHD_SOURCE_DIR "/config/";
+  const std::string shipped = test::source_path("config/");
   fs::create_directories(directory / "conf");
   fs::create_directories(directory / "recordings");
   fs::copy_file(shipped + "meshes/cube.off", directory / "conf/cube.off");

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "tests/support/gallery_comparison.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/sweep_comparison.hpp"
 #include "tools/gallery.hpp"
 
@@ -51,7 +52,7 @@ void print(const std::string& name, const char* loop, const GalleryComparison& c
 
 long prove_gallery(double seconds, const std::string& only) {
   long different = 0;
-  for (const GalleryScene& scene : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"}))) {
+  for (const GalleryScene& scene : gallery(SearchPath({test::source_path("config")}))) {
     if (scene.name.find(only) == std::string::npos) continue;
     for (const bool closed_loop : {false, true}) {
       const GalleryComparison c = compare_gallery_scene(scene.name, closed_loop, seconds);

@@ -29,6 +29,7 @@
 #include "config/load_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/machine_load.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // Proves that the force ends when the daemon dies. This process emulates the device; the real daemon is a
@@ -232,7 +233,7 @@ class Proof {
   Proof(std::string program, std::string profile, std::uint64_t seed)
       : program_(std::move(program)),
         profile_file_(std::move(profile)),
-        profile_(load_profile_named(profile_file_, SearchPath({WRENCHD_SOURCE_DIR "/config"}))),
+        profile_(load_profile_named(profile_file_, SearchPath({test::source_path("config")}))),
         random_(seed) {
     if (!(profile_.watchdog_s > 0.0))
       throw std::runtime_error("profile " + profile_.name +

@@ -26,6 +26,7 @@
 #include "core/wrench_law.hpp"
 #include "devices/simulation/hand_path.hpp"
 #include "devices/simulation/simulated_handle.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 
 // Proves that contact does not supply energy to the hand. The ledger uses the continuous plant, not the
@@ -504,7 +505,7 @@ Pose resting(const Scene& scene, RandomValues& random) {
 
 /// The shipped cube above a floor, or above a post 40 mm wide and high. The post is a mesh, as in the daemon.
 Scene scene_of(bool post) {
-  const char* cube = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
+  const std::string cube = test::source_path("config/meshes/cube.off");
   SceneSettings settings;
   settings.tool.mesh = cube;
   settings.tool.scale = 0.001;

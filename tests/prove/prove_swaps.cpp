@@ -24,6 +24,7 @@
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/machine_load.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // Changes the rendering thousands of times, half of the changes invalid, while the real loop runs in wall
@@ -56,8 +57,8 @@ struct Times {
 };
 
 RunConfig plan_of() {
-  RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
-                                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  RunConfig plan = load_run_config({test::source_path("config/wrenchd.toml"), {}, {}, false},
+                                   SearchPath({test::source_path("config")}));
   plan.settings.servo.realtime = Realtime::best_effort;
   plan.settings.servo.self_test_s = 0.0;
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()},
@@ -112,7 +113,7 @@ class Asker {
   static TomlNode toml(const std::string& text) { return read_toml_text(text, "ask"); }
 
   fs::path scene(bool good) {
-    const std::string mesh = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
+    const std::string mesh = test::source_path("config/meshes/cube.off");
     const fs::path file = directory_ / ("scene" + std::to_string(++scenes_ % 4) + ".toml");
     std::ofstream out(file);
     out << "[tool]\nmesh = \"" << mesh << "\"\nscale = 0.001\nmass = 0.2\n"

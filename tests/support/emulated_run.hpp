@@ -8,6 +8,7 @@
 #include "daemon/runtime.hpp"
 #include "daemon/servo/servo_loop.hpp"
 #include "devices/links/simulated_link.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd::test {
 
@@ -15,8 +16,8 @@ namespace wrenchd::test {
 /// changes the motion. Without self-test.
 inline RunConfig prescribed_motion(const std::string& profile, const std::function<Pose(double t_s)>& X_BH,
                                    double duration_s) {
-  RunConfig config = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, profile, true},
-                                     SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  RunConfig config = load_run_config({source_path("config/wrenchd.toml"), {}, profile, true},
+                                     SearchPath({source_path("config")}));
   config.settings.servo.self_test_s = 0.0;
   SimulationSettings& simulation = config.settings.simulation;
   simulation.playback_path.clear();

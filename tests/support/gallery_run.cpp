@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 
 namespace wrenchd::test {
@@ -52,8 +53,8 @@ double turned_deg(const GalleryRun& run, bool hand, double time_s) {
 }  // namespace
 
 RunConfig gallery_config(const std::string& name) {
-  RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/gallery/" + name + ".toml", {}, {}, false},
-                                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  RunConfig plan = load_run_config({source_path("config/gallery/") + name + ".toml", {}, {}, false},
+                                   SearchPath({source_path("config")}));
   plan.settings.servo.self_test_s = 0.0;
   return plan;
 }
@@ -122,7 +123,7 @@ double run_figure(const GalleryRun& run, const std::string& quantity, double tim
 }
 
 std::vector<ExpectedFigure> expected_figures(const std::string& name) {
-  const std::string file = WRENCHD_SOURCE_DIR "/tests/data/gallery/" + name + ".csv";
+  const std::string file = source_path("tests/data/gallery/") + name + ".csv";
   std::ifstream in(file);
   std::vector<ExpectedFigure> all;
   std::string line;

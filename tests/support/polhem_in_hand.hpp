@@ -11,12 +11,12 @@
 #include "devices/links/loopback_link.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd::test {
 
 inline DeviceProfile polhem_profile() {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/polhem.toml",
-                      SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  return load_profile(source_path("config/profiles/polhem.toml"), SearchPath({source_path("config")}));
 }
 
 /// A Polhem whose counters start at an arbitrary pose, and a simulated person who follows the homing

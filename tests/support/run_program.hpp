@@ -15,6 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd::test {
@@ -31,7 +32,7 @@ class RunningProgram {
  public:
   RunningProgram(const std::string& name, const std::vector<std::string>& arguments,
                  const std::string& in = {}) {
-    const std::string program = WRENCHD_BINARY_DIR "/" + name;
+    const std::string program = program_path(name);
     std::vector<std::string> words = arguments;
     words.insert(words.begin(), program);
     std::vector<char*> argv;

@@ -4,14 +4,15 @@
 #include "daemon/runtime.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/simulation/simulated_device.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd::test {
 
 /// Returns the shipped configuration: simulated device, cube on table. The self-test is disabled, so that a
 /// test starts directly.
 inline RunConfig shipped_config() {
-  RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
-                                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  RunConfig plan = load_run_config({source_path("config/wrenchd.toml"), {}, {}, false},
+                                   SearchPath({source_path("config")}));
   plan.settings.servo.self_test_s = 0.0;
   return plan;
 }

@@ -21,6 +21,7 @@
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/support/firmware_in_hand.hpp"
 #include "tests/support/machine_load.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 #include "tools/conform.hpp"
@@ -436,7 +437,7 @@ TEST_CASE("a device that is unplugged or falls silent ends the check with a reas
 }
 
 TEST_CASE("conform accepts profiles of the open report layout only", "[conform]") {
-  const SearchPath shipped({WRENCHD_SOURCE_DIR "/config"});
+  const SearchPath shipped({test::source_path("config")});
   for (const char* name : {"loopback", "reference_full_speed", "reference_high_speed"})
     CHECK_NOTHROW(require_open_layout(load_profile_named(name, shipped)));
   for (const char* name : {"example", "polhem", "falcon", "spacemouse_split", "woodenhaptics"})
@@ -515,7 +516,7 @@ TEST_CASE("wrenchctl conform judges a device at the other end of a socket, and i
   for (const bool good : {true, false}) {
     const FirmwareProcess device(good ? FirmwareMistakes{} : inverted);
     const ProgramResult result =
-        run_program("wrenchctl", {"conform", WRENCHD_SOURCE_DIR "/config/profiles/reference_full_speed.toml",
+        run_program("wrenchctl", {"conform", test::source_path("config/profiles/reference_full_speed.toml"),
                                   "--link-fd", device.socket(), "--motion", "5"});
     INFO(result.out << result.err);
     REQUIRE_RATE(load, result.exit_code == (good ? 0 : 5));
@@ -531,7 +532,7 @@ TEST_CASE("a signal ends wrenchctl conform, which releases the device", "[confor
   const MachineLoad load;
   const FirmwareProcess device;
   RunningProgram program(
-      "wrenchctl", {"conform", WRENCHD_SOURCE_DIR "/config/profiles/reference_full_speed.toml", "--link-fd",
+      "wrenchctl", {"conform", test::source_path("config/profiles/reference_full_speed.toml"), "--link-fd",
                     device.socket(), "--motion", "3"});
   REQUIRE_RATE(load, program.wait_for_output("Pulses of at most"));
   REQUIRE_RATE(load, device.motors_on());
@@ -549,7 +550,7 @@ TEST_CASE("wrenchctl conform rejects what it cannot check, with the remedy", "[c
   CHECK(unnamed.exit_code == 1);
   CHECK_THAT(unnamed.err, Contains("--link-fd") && Contains("name its profile"));
   const ProgramResult other = run_program(
-      "wrenchctl", {"conform", WRENCHD_SOURCE_DIR "/config/profiles/polhem.toml", "--link-fd", "3"});
+      "wrenchctl", {"conform", test::source_path("config/profiles/polhem.toml"), "--link-fd", "3"});
   CHECK(other.exit_code == 1);
   CHECK_THAT(other.err, Contains("open report layout"));
   const ProgramResult node = run_program("wrenchctl", {"conform", "--node", "/dev/null"});

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/known_profiles.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tools/doctor.hpp"
 #include "tools/udev_rules.hpp"
@@ -12,7 +13,7 @@ namespace {
 using namespace test;
 using namespace std::chrono_literals;
 
-const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+const KnownProfiles kShipped = known_profiles(SearchPath({test::source_path("config")}));
 
 /// A machine without problems. Each test changes one property.
 struct Healthy {

@@ -10,6 +10,7 @@
 #include "daemon/recording/replay.hpp"
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/gallery_run.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tools/gallery.hpp"
@@ -54,7 +55,7 @@ class Admissible {
 
 std::vector<std::string> names() {
   std::vector<std::string> all;
-  for (const GalleryScene& scene : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
+  for (const GalleryScene& scene : gallery(SearchPath({test::source_path("config")})))
     all.push_back(scene.name);
   return all;
 }

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/hex_text.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tools/list_devices.hpp"
@@ -16,7 +17,7 @@ namespace {
 using namespace test;
 using Catch::Contains;
 
-const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+const KnownProfiles kShipped = known_profiles(SearchPath({test::source_path("config")}));
 
 struct Ids {
   std::uint16_t vendor, product, page, usage;
@@ -148,7 +149,7 @@ TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_
   CHECK(holds(teensy, "\n    polhem: 16c0:0486 is the id of every Teensy of PJRC"));
   CHECK(holds(teensy, "set profile = \"polhem\" in [device] of wrenchd.toml"));
   CHECK(holds(teensy, "\n    woodenhaptics: it is used only if the configuration names it\n"));
-  KnownProfiles own = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  KnownProfiles own = known_profiles(SearchPath({test::source_path("config")}));
   for (DeviceProfile& profile : own.profiles)
     if (profile.name == "polhem") profile.match.product = "RawHID";
   const std::string polhem =
@@ -327,8 +328,8 @@ std::string printed(const std::string& devices, const std::string& options = {})
   const TemporaryDirectory dir;
   const auto file = dir.write("devices", devices);
   const std::string out = (dir.path() / "out").string();
-  const std::string command = "umockdev-run -d " + file.string() +
-                              " -- " WRENCHD_BINARY_DIR "/wrenchctl devices " + options + " > " + out;
+  const std::string command = "umockdev-run -d " + file.string() + " -- " + test::program_path("wrenchctl") +
+                              " devices " + options + " > " + out;
   REQUIRE(std::system(command.c_str()) == 0);
   std::ifstream stream(out);
   return {std::istreambuf_iterator<char>(stream), {}};

@@ -13,6 +13,7 @@
 #include "devices/six_axes.hpp"
 #include "tests/support/case_count.hpp"
 #include "tests/support/hex_text.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
@@ -249,7 +250,7 @@ TEST_CASE("a multi-axis controller with a vendor-defined output report may have 
 }
 
 TEST_CASE("a proposal says first which profiles already fit the device", "[propose_profile]") {
-  const auto shipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"})).profiles;
+  const auto shipped = known_profiles(SearchPath({test::source_path("config")})).profiles;
   DescriptorSource mouse{space_navigator(), "a test", {}, UsbId{0x046d, 0xc626}};
   CHECK(fitting_profiles(mouse, shipped) == std::vector<std::string>{"spacemouse_split"});
   const std::string text = propose_profile(mouse, fitting_profiles(mouse, shipped));
@@ -287,7 +288,7 @@ TEST_CASE("a completed proposal of the reference layout loads", "[propose_profil
   std::string text = proposal(from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0"));
   text = completed(text);
-  std::ifstream stream(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
+  std::ifstream stream(test::source_path("config/profiles/loopback.toml"));
   const std::string loopback{std::istreambuf_iterator<char>(stream), {}};
   text = text.substr(0, text.find("[pose_report]")) + loopback.substr(loopback.find("[pose_report]"));
   CHECK(rejection_text(text).empty());
@@ -413,7 +414,8 @@ TEST_CASE("wrenchctl profile reads the report descriptor of a hidraw device from
                      "HIDIOCGRAWNAME 27 " + hex_text(Bytes(name.begin(), name.end())) + "\n");
   const std::string out = (dir.path() / "out").string();
   const std::string command = "umockdev-run -d " + device.string() + " -i /dev/hidraw0=" + answers.string() +
-                              " -- " WRENCHD_BINARY_DIR "/wrenchctl profile --from /dev/hidraw0 -o " + out;
+                              " -- " + test::program_path("wrenchctl") + " profile --from /dev/hidraw0 -o " +
+                              out;
   REQUIRE(std::system(command.c_str()) == 0);
   std::ifstream stream(out);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};

@@ -5,6 +5,7 @@
 
 #include "config/load_profile.hpp"
 #include "config/report_bytes.hpp"
+#include "tests/support/paths.hpp"
 #include "tools/report_text.hpp"
 
 using namespace wrenchd;
@@ -14,7 +15,7 @@ using Catch::StartsWith;
 namespace {
 
 DeviceProfile shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
+  return load_profile(test::source_path("config/profiles/") + name + ".toml");
 }
 
 std::string decoded(const std::string& profile, const std::string& hex, bool to_device = false) {

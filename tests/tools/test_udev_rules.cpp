@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/known_profiles.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tools/udev_rules.hpp"
 
@@ -12,7 +13,7 @@ namespace {
 
 using namespace test;
 
-const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+const KnownProfiles kShipped = known_profiles(SearchPath({test::source_path("config")}));
 
 DeviceProfile profile(const std::string& name, Transport transport, std::vector<UsbId> usb) {
   DeviceProfile p;
@@ -134,9 +135,9 @@ TEST_CASE("wrenchctl udev-rules: each profile adds a rule, and an invalid profil
             "inherits = \"reference_full_speed\"\nname = \"mine\"\n[match]\nusb = [\"1209:0042\"]\n");
   dir.write("profiles/reference_full_speed.toml", "");
   std::filesystem::remove(dir.path() / "profiles/reference_full_speed.toml");
-  std::filesystem::copy(WRENCHD_SOURCE_DIR "/config/profiles/reference_full_speed.toml",
+  std::filesystem::copy(test::source_path("config/profiles/reference_full_speed.toml"),
                         dir.path() / "profiles");
-  std::filesystem::copy(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml", dir.path() / "profiles");
+  std::filesystem::copy(test::source_path("config/profiles/loopback.toml"), dir.path() / "profiles");
   const ProgramResult good = run_program("wrenchctl", {"udev-rules", "--from", dir.path().string()});
   INFO(good.err);
   CHECK(good.exit_code == 0);

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "core/pose.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_meshes.hpp"
 
@@ -661,7 +662,7 @@ std::string without_progress(const std::string& err) {
 
 TEST_CASE("wrenchctl check accepts every file that is shipped") {
   int count = 0;
-  for (const fs::path& file : fs::recursive_directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / "config")) {
+  for (const fs::path& file : fs::recursive_directory_iterator(test::source_path("config"))) {
     if (file.extension() != ".toml") continue;
     ++count;
     const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
@@ -697,7 +698,7 @@ TEST_CASE("wrenchctl check rejects the files that the daemon rejects") {
     CHECK(result.err.find(expected) != std::string::npos);
   };
   const auto shipped = [](const std::string& name) {
-    return contents(fs::path(WRENCHD_SOURCE_DIR) / "config" / name);
+    return contents(fs::path(test::source_path("config")) / name);
   };
   const auto without = [](std::string text, const std::string& line_with) {
     const std::size_t start = text.rfind('\n', text.find("\n" + line_with) + 1) + 1;

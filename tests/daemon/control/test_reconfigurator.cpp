@@ -10,6 +10,7 @@
 #include "daemon/control/reconfigurator.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -21,7 +22,7 @@ namespace {
 
 using namespace test;
 
-const std::string kMeshes = WRENCHD_SOURCE_DIR "/config/meshes/";
+const std::string kMeshes = test::source_path("config/meshes/");
 
 /// Returns a scene with a cube of 50 mm as tool, and these obstacles.
 std::string scene_text(const std::string& obstacles) {
@@ -451,7 +452,7 @@ struct Configured {
   }
   void write_scene(const std::string& obstacles) { scene = files.write("scene.toml", scene_text(obstacles)); }
   RunConfig read() const {
-    RunConfig plan = load_run_config({config, {}, {}, false}, SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+    RunConfig plan = load_run_config({config, {}, {}, false}, SearchPath({test::source_path("config")}));
     const RunConfig pressing = pressing_plan();
     plan.settings.servo.self_test_s = 0.0;
     plan.settings.simulation = pressing.settings.simulation;

@@ -14,6 +14,7 @@
 #include <wrenchd/client.hpp>
 
 #include "daemon/recording/recording_file.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
@@ -125,7 +126,7 @@ TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
     CHECK((tick + 1)->now_ns > marker.time_ns);
   }
   std::string printed;
-  CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), printed) == 0);
+  CHECK(run_python(test::source_path("tests/python/check_recording.py") + " " + file.string(), printed) == 0);
   INFO(printed);
   CHECK(printed.find(" ticks, ") != std::string::npos);
 
@@ -142,7 +143,8 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
     print(len(recording["ticks"]))
 )");
   std::string rows;
-  CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
+  CHECK(run_python(script.string() + " " + test::source_path("tools/python") + " " + daemon.socket, rows) ==
+        0);
   CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
   CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
   CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is not a valid name of a recording") !=
@@ -215,7 +217,7 @@ TEST_CASE("wrenchctl replays, exports and plots a recording of wrenchd", "[recor
   const TemporaryDirectory files;
   const std::string file = (files.path() / "run.h5").string();
   const ProgramResult run =
-      run_program("wrenchd", {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--virtual-time",
+      run_program("wrenchd", {"--config", test::source_path("config/wrenchd.toml"), "--virtual-time",
                               "--seconds", "6", "--arm", "--record", file});
   INFO(run.err);
   REQUIRE(run.exit_code == 0);
@@ -226,7 +228,7 @@ TEST_CASE("wrenchctl replays, exports and plots a recording of wrenchd", "[recor
   CHECK(replayed.out.find("compared: X_WP, X_WQ, eps, F_T, F_out, energy, ") != std::string::npos);
   CHECK(replayed.out.find("6001 ticks, all bits are equal") != std::string::npos);
   const ProgramResult other = run_program(
-      "wrenchctl", {"replay", file, "--scene", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"});
+      "wrenchctl", {"replay", file, "--scene", test::source_path("config/scenes/cube_over_plunger.toml")});
   CHECK(other.exit_code == 4);
   CHECK(other.out.find("first difference at tick ") != std::string::npos);
 

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/scene_methods.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -60,7 +61,7 @@ void has(const RpcError& error, const std::string& part) {
 
 Json a_block() {
   return {{"name", "block"},
-          {"mesh", WRENCHD_SOURCE_DIR "/config/meshes/cube.off"},
+          {"mesh", test::source_path("config/meshes/cube.off")},
           {"scale", 0.001},
           {"position_m", {0.0, 0.2, 0.0}}};
 }
@@ -84,7 +85,7 @@ TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_meth
 TEST_CASE("scene.load finds the file on the search path and replaces the whole scene", "[scene_methods]") {
   const Rig a;
   CHECK(a.ask("scene.load",
-              {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering_id"] == 1);
+              {{"file", test::source_path("config/scenes/cube_over_plunger.toml")}})["rendering_id"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
   const RpcError none = a.rejected("scene.load", {{"file", "scenes/no_such.toml"}});
   CHECK(none.code() == RpcCode::rejected);
@@ -98,7 +99,7 @@ TEST_CASE("scene.geometry has the configured viewpoint, and none for a scene tha
   plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
   const Rig a(plan);
   CHECK(a.ask("scene.geometry")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
-  a.ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
+  a.ask("scene.load", {{"file", test::source_path("config/scenes/cube_over_plunger.toml")}});
   CHECK(a.ask("scene.geometry")["view"].is_null());
   CHECK(Rig().ask("scene.geometry")["view"].is_null());
 }
@@ -142,7 +143,7 @@ TEST_CASE(
   dir.write("scenes/broken.toml", secret + "\n");
   std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.off");
   std::filesystem::create_symlink(shadow, dir.path() / "scenes/link.toml");
-  std::filesystem::copy_file(WRENCHD_SOURCE_DIR "/config/meshes/cube.off", dir.path() / "scenes/cube.off");
+  std::filesystem::copy_file(test::source_path("config/meshes/cube.off"), dir.path() / "scenes/cube.off");
   RunConfig plan = shipped_config();
   plan.settings.scene = dir.path() / "scenes/configured.toml";
   const Rig a(plan);

@@ -5,6 +5,7 @@
 
 #include "daemon/control/scene_methods.hpp"
 #include "daemon/control/state_methods.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 
 namespace wrenchd {
@@ -27,7 +28,7 @@ TEST_CASE("obstacle names come with the number of their rendering, also after a 
   CHECK(first.result["layout"]["rendering_id"] == 0);
   CHECK(first.result["layout"]["obstacles"] == Json::array({"table"}));
 
-  ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
+  ask("scene.load", {{"file", test::source_path("config/scenes/cube_over_plunger.toml")}});
   CHECK(ask("state.obstacles").result == Json({{"obstacles", {"table", "plunger"}}, {"rendering_id", 1}}));
   CHECK(ask("state.open").result["layout"]["obstacles"] == Json({"table", "plunger"}));
   CHECK(ask("state.open").result["layout"]["rendering_id"] == 1);

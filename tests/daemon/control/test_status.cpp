@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/daemon_methods.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -58,8 +59,7 @@ TEST_CASE("a looser limit that the armed loop ignores is not in the status", "[s
 
 TEST_CASE("the status names the present scene", "[status]") {
   const TemporaryDirectory files;
-  const auto file = files.write("empty.toml", "[tool]\nmesh = \"" WRENCHD_SOURCE_DIR
-                                              "/config/meshes/cube.off\"\nscale = 0.001\nmass = 0.2\n");
+  const auto file = files.write("empty.toml", "[tool]\nmesh = \"" + test::source_path("config/meshes/cube.off") + "\"\nscale = 0.001\nmass = 0.2\n";
   Rig r;
   CHECK(r.status()["scene"]["file"] == r.s.runtime.config().scene.file.string());
   CHECK(r.status()["scene"]["obstacles"] == 1);

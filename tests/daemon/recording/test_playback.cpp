@@ -6,6 +6,7 @@
 #include "config/pose_table.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/run_recorder.hpp"
 #include "tests/support/shipped_config.hpp"
@@ -156,7 +157,7 @@ TEST_CASE("wrenchd plays back the file of its command line", "[playback][program
   const TemporaryDirectory files;
   const auto csv = files.write("pressing.csv", pressing());
   const std::vector<std::string> run = {
-      "--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--virtual-time", "--seconds", "3.5", "--arm",
+      "--config", test::source_path("config/wrenchd.toml"), "--virtual-time", "--seconds", "3.5", "--arm",
       "--live"};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.begin(), run.begin(), run.end());

@@ -12,6 +12,7 @@
 #include "daemon/realtime.hpp"
 #include "daemon/recording/recordings.hpp"
 #include "daemon/wall_clock.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -294,7 +295,7 @@ TEST_CASE("a recording that begins after a change of the scene has the text of t
     recordings.stop();
     return read_recording(file).header;
   };
-  const std::string cube = "mesh = \"" WRENCHD_SOURCE_DIR "/config/meshes/cube.off\"\nscale = 0.001\n";
+  const std::string cube = "mesh = \"" + test::source_path("config/meshes/cube.off") + "\"\nscale = 0.001\n";
   const std::string other = "# another scene\n[tool]\n" + cube +
                             "mass = 0.3\n[[obstacle]]\nname = \"post\"\n" + cube +
                             "position_m = [0.2, 0.0, 0.0]\n";
@@ -315,7 +316,7 @@ TEST_CASE("a recording that begins after a change of the scene has the text of t
 TEST_CASE("a recording contains the mesh that was loaded, whatever its file has become", "[recording]") {
   const TemporaryDirectory files;
   const std::string mesh = [] {
-    std::ifstream in(WRENCHD_SOURCE_DIR "/config/meshes/cube.off", std::ios::binary);
+    std::ifstream in(test::source_path("config/meshes/cube.off"), std::ios::binary);
     return std::string{std::istreambuf_iterator<char>(in), {}};
   }();
   const auto file = files.write("tool.off", mesh),
@@ -346,7 +347,7 @@ TEST_CASE("a recording contains the mesh that was loaded, whatever its file has 
     std::get<TomlNode::Table>(block.value).push_back(std::move(entry));
   };
   set("name", std::string("block"));
-  set("mesh", std::string(WRENCHD_SOURCE_DIR "/config/meshes/cube.off"));
+  set("mesh", test::source_path("config/meshes/cube.off"));
   set("scale", 0.001);
   CHECK(s.runtime.reconfigurator().insert_obstacle(block, "test") == "block");
   CHECK(tool("changed") == mesh);

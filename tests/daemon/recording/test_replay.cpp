@@ -6,6 +6,7 @@
 #include "daemon/recording/recorded_inputs.hpp"
 #include "daemon/recording/replay.hpp"
 #include "tests/support/buried_tool.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/run_recorder.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -230,7 +231,7 @@ TEST_CASE("a replay needs no file but the recording", "[replay]") {
   // obstacle, and the profile inherits from another.
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const auto there = std::filesystem::path(WRENCHD_SOURCE_DIR) / "config";
+  const auto there = test::source_path("config");
   const auto copies = directory.path() / "copies";
   std::filesystem::create_directories(copies);
   for (const char* name : {"meshes", "scenes", "hands", "profiles"})

@@ -15,6 +15,7 @@
 #include "daemon/wall_clock.hpp"
 #include "devices/links/simulated_link.hpp"
 #include "tests/support/buried_tool.hpp"
+#include "tests/support/paths.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -123,8 +124,8 @@ TEST_CASE("the wrench sent is that of Eq. (16), about the handle in the axes of 
 TEST_CASE("a device without rotational motors renders force; the loop drops the torque and reports it",
           "[servo]") {
   RunConfig plan = shipped_config();
-  plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/polhem.toml",
-                              SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  plan.profile = load_profile(test::source_path("config/profiles/polhem.toml"),
+                              SearchPath({test::source_path("config")}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
   Runtime runtime(plan, *link, clock, ProxySearchMode::in_tick);
@@ -523,7 +524,7 @@ TEST_CASE("scene time begins at the first tick and advances with the tick times 
 
 TEST_CASE("a plunger that rises from the table lifts and tilts the cube", "[servo][moving]") {
   RunConfig plan = shipped_config();
-  plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
+  plan.scene = load_scene(test::source_path("config/scenes/cube_over_plunger.toml"));
   VirtualRuntime s(plan);
   s.runtime.loop().requests().arm();
   double most_tilt = 0.0, most_lift_m = 0.0;
@@ -543,7 +544,7 @@ TEST_CASE("a plunger that rises from the table lifts and tilts the cube", "[serv
 TEST_CASE("the guard does not scale the force of a plunger that presses against a hand at rest",
           "[servo][moving]") {
   RunConfig plan = shipped_config();
-  plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
+  plan.scene = load_scene(test::source_path("config/scenes/cube_over_plunger.toml"));
   plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
   plan.settings.simulation.hand_repeats = false;
   VirtualRuntime s(plan);

@@ -3,6 +3,7 @@
 
 #include "config/known_profiles.hpp"
 #include "devices/discovery/choose_device.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
 namespace wrenchd {
@@ -12,7 +13,7 @@ using namespace test;
 using Catch::Contains;
 
 const std::vector<DeviceProfile> kShipped =
-    known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"})).profiles;
+    known_profiles(SearchPath({test::source_path("config")})).profiles;
 
 UsbDevice reference(const std::string& serial) {
   UsbDevice device;

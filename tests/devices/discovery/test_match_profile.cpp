@@ -7,13 +7,14 @@
 #include "config/load_profile.hpp"
 #include "devices/discovery/match_profile.hpp"
 #include "devices/discovery/unusable_devices.hpp"
+#include "tests/support/paths.hpp"
 
 using namespace wrenchd;
 using Catch::Contains;
 
 namespace {
 
-const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
+const SearchPath kShipped({test::source_path("config")});
 
 std::vector<DeviceProfile> shipped() {
   std::vector<DeviceProfile> profiles;

@@ -9,6 +9,7 @@
 #include "devices/links/host_watchdog.hpp"
 #include "devices/report_codec.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 
 namespace wrenchd {
 namespace {
@@ -19,7 +20,7 @@ constexpr TimePoint kStart = TimePoint{} + 5s;
 constexpr Duration kAfter = 6ms;
 
 DeviceProfile shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
+  return load_profile(test::source_path("config/profiles/") + name + ".toml");
 }
 
 Packet packet_of(const DeviceProfile& profile, const WrenchReport& report) {

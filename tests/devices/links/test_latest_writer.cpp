@@ -14,6 +14,7 @@
 #include "devices/links/latest_writer.hpp"
 #include "devices/report_codec.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -158,7 +159,7 @@ TEST_CASE("a disconnected device ends the writer", "[usb]") {
 }
 
 TEST_CASE("the writer sends zero commands for a hanging loop", "[usb]") {
-  const DeviceProfile profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
+  const DeviceProfile profile = load_profile(test::source_path("config/profiles/loopback.toml"));
   WrenchReport push;
   push.F.force_N = {0.0, 0.0, 1.0};
   push.enable = true;

@@ -15,6 +15,7 @@
 #include "devices/links/simulated_link.hpp"
 #include "devices/profile_device.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/paths.hpp"
 
 using namespace wrenchd;
 using namespace std::chrono_literals;
@@ -23,7 +24,7 @@ using Kind = SimulatedFault::Kind;
 
 namespace {
 
-const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
+const SearchPath kShipped({test::source_path("config")});
 
 /// All shipped profiles, read from the folder.
 std::vector<DeviceProfile> all_shipped() {
@@ -33,7 +34,7 @@ std::vector<DeviceProfile> all_shipped() {
 }
 
 DeviceProfile shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
+  return load_profile(test::source_path("config/profiles/") + name + ".toml", kShipped);
 }
 
 /// No delays and no quanta except those of the protocol: the resolution of the device remains.

@@ -14,6 +14,7 @@
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/polhem_pose.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -24,7 +25,7 @@ using namespace std::chrono_literals;
 namespace {
 
 DeviceProfile shipped(const std::string& name) {
-  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
+  return load_profile(test::source_path("config/profiles/") + name + ".toml");
 }
 
 /// The device of a shipped profile on its emulator, opened and read once.

@@ -17,6 +17,7 @@
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
 #include "tests/devices/usb/mock_device.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/support/polhem_pose.hpp"
 
 using namespace wrenchd;
@@ -31,8 +32,8 @@ TimePoint now() {
 
 /// The shipped profile without time limits, because they depend on the speed of the machine.
 DeviceProfile timeless(const char* name) {
-  DeviceProfile profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml",
-                                       SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  DeviceProfile profile = load_profile(test::source_path("config/profiles/") + std::string(name) + ".toml",
+                                       SearchPath({test::source_path("config")}));
   profile.stale_fault_s = 3600;
   if (profile.stream == StreamStyle::lock_step) profile.stream = StreamStyle::free_running;
   return profile;
