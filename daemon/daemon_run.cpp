@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "config/load_loopback_script.hpp"
+#include "daemon/clear_start.hpp"
 #include "daemon/control/control_interface.hpp"
 #include "daemon/control/event_feed.hpp"
 #include "daemon/control/record_methods.hpp"
@@ -165,6 +166,24 @@ std::unique_ptr<SimulatedLink> make_scripted_link(const RunConfig& config, const
   return link;
 }
 
+/// Displaces the path of a simulated hand that would start inside an obstacle, and says so.
+void start_clear(const Runtime& runtime, DeviceInHand& device) {
+  const Settings& settings = runtime.config().settings;
+  if (!settings.simulation.playback_path.empty()) return;  // recorded poses stay as they are
+  const auto d_B_m = displacement_to_clear_start(runtime.scene(), settings, device.X_BH());
+  if (!d_B_m)
+    spdlog::warn(
+        "the simulated hand starts where the tool overlaps an obstacle, and no pose near it is free: it will "
+        "not arm. "
+        "Start its path, [simulation] hand_script, where the tool has room");
+  else if (*d_B_m != Vector3d::Zero() && device.displace_path(*d_B_m))
+    spdlog::info(
+        "the simulated hand would start where the tool overlaps an obstacle: its path is displaced by "
+        "({:.1f}, {:.1f}, "
+        "{:.1f}) mm in the device base",
+        1e3 * d_B_m->x(), 1e3 * d_B_m->y(), 1e3 * d_B_m->z());
+}
+
 /// Runs the loop with a simulated device. If a script unplugs the device, waits until it can be opened again,
 /// as for a real device; it is disarmed then. `run_once` runs the loop until it ends.
 Fault run_with_reconnection(Runtime& runtime, const RunContext& context, Clock& clock, TimePoint end,
@@ -199,6 +218,7 @@ Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
   const auto link = make_scripted_link(config, script, clock);
   return run_on_link(std::move(config), context, *link, clock,
                      [&](Runtime& runtime, Recordings& recordings, LiveView& view) {
+                       start_clear(runtime, link->device());
                        runtime.open();
                        log_missing_motors(runtime.config().profile);
                        const TimePoint end = end_time(context.options, clock);
@@ -213,13 +233,18 @@ Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
 Fault run_simulated_in_wall_time(RunConfig config, const RunContext& context, const LoopbackScript& script) {
   WallClock clock;
   std::unique_ptr<ReportLink> link;
-  if (context.options.link_fd >= 0)
+  DeviceInHand* device = nullptr;  // null: in another process
+  if (context.options.link_fd >= 0) {
     link = std::make_unique<SocketLink>(context.options.link_fd, link_settings(config));
-  else
-    link = make_scripted_link(config, script, clock);
+  } else {
+    auto simulated = make_scripted_link(config, script, clock);
+    device = &simulated->device();
+    link = std::move(simulated);
+  }
   log_grants(lock_memory(config.settings.servo.realtime));
   return run_on_link(
       std::move(config), context, *link, clock, [&](Runtime& runtime, Recordings&, LiveView& view) {
+        if (device != nullptr) start_clear(runtime, *device);
         runtime.open();
         log_missing_motors(runtime.config().profile);
         const TimePoint end = end_time(context.options, clock);

@@ -60,14 +60,17 @@ std::string remark(const TickRecord& r, ShownWrench shown) {
 
 }  // namespace
 
-std::string live_line(const TickRecord& r, const LoopTiming& timing, ShownWrench shown) {
+std::string live_line(const TickRecord& r, const LoopTiming& timing, ShownWrench shown,
+                      const std::string& no_force) {
+  const std::string tool =
+      fmt::format("{:7.2f} s {:<8} | tool {:+6.1f} {:+6.1f} {:+6.1f} mm {:4.1f} deg | {} contacts",
+                  r.device_time_s, state(r), 1e3 * r.X_WP[0], 1e3 * r.X_WP[1], 1e3 * r.X_WP[2],
+                  angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts);
+  if (!no_force.empty()) return tool + " | " + no_force;
   const std::array<double, 6> F = wrench(r, shown);
-  return fmt::format(
-      "{:7.2f} s {:<8} | tool {:+6.1f} {:+6.1f} {:+6.1f} mm {:4.1f} deg | {} contacts | "
-      "F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m{} | tick {} us",
-      r.device_time_s, state(r), 1e3 * r.X_WP[0], 1e3 * r.X_WP[1], 1e3 * r.X_WP[2],
-      angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, F[0], F[1], F[2], 1e3 * F[3], 1e3 * F[4],
-      1e3 * F[5], remark(r, shown), times(timing.tick));
+  return fmt::format("{} | F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m{} | tick {} us",
+                     tool, F[0], F[1], F[2], 1e3 * F[3], 1e3 * F[4], 1e3 * F[5], remark(r, shown),
+                     times(timing.tick));
 }
 
 std::string summary(const LoopTotals& totals, const LoopTiming& timing, double seconds, ShownWrench shown) {

@@ -17,9 +17,10 @@ enum class ShownWrench : std::uint8_t {
 };
 
 /// Returns one line for a person: device time, state, pose of the tool, contacts, force, torque, and
-/// p50/p99.9/max of the tick time. Not RT-safe: allocates.
+/// p50/p99.9/max of the tick time. no_force: why there is no force; it takes the place of force and torque
+/// unless it is empty. Not RT-safe: allocates.
 std::string live_line(const TickRecord& record, const LoopTiming& timing,
-                      ShownWrench shown = ShownWrench::sent);
+                      ShownWrench shown = ShownWrench::sent, const std::string& no_force = {});
 
 /// Returns several lines for the end of a run: ticks, rate, contact, largest wrench, times of each stage,
 /// overruns. seconds: duration of the run. Not RT-safe: allocates.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/servo/servo_loop.hpp"
+#include "daemon/wait_text.hpp"
 
 namespace wrenchd {
 namespace {
@@ -22,7 +23,8 @@ void LiveView::sample(ServoLoop& loop) {
   TickRecord record;
   if (!print_ || !loop.telemetry().latest_record().read(record)) return;
   if (!terminal_ && ++samples_ % kSamplesPerLine != 0) return;
-  const std::string line = live_line(record, loop.telemetry().timing(), shown_);
+  const std::string line =
+      live_line(record, loop.telemetry().timing(), shown_, wait_text(loop.telemetry().wait_reason()));
   print_(terminal_ ? "\r\x1b[K" + line : line + "\n");
 }
 

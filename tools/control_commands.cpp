@@ -99,6 +99,9 @@ std::string status_text(const Json& s) {
   if (const Json& cause = s["cause"]; cause.is_object())
     text += fmt::format("cause      {}: {}\nremedy     {}\n", cause["name"].get<std::string>(),
                         cause["message"].get<std::string>(), cause["cure"].get<std::string>());
+  if (const auto no_force = s.find("no_force");
+      no_force != s.end() && no_force->is_string() && !s["cause"].is_object())
+    text += fmt::format("no force   {}\n", no_force->get<std::string>());
   const Json &device = s["device"], &limits = s["limits"], &timing = s["timing"];
   text += fmt::format("device     {}{}, {}\n", text_or(device["profile"], "?"),
                       device["simulated"].get<bool>() ? " (simulated)" : "",

@@ -12,6 +12,7 @@
 #include "daemon/runtime.hpp"
 #include "daemon/servo/servo_loop.hpp"
 #include "daemon/version.hpp"
+#include "daemon/wait_text.hpp"
 #include "devices/discovery/choose_device.hpp"
 #include "devices/discovery/usb_devices.hpp"
 
@@ -48,6 +49,13 @@ Json last_fault_json(const FeedSnapshot& now) {
   return fault;
 }
 
+/// Why there is no force now, as text; null in states with force.
+Json no_force_json(const DaemonContext& context, const FeedSnapshot& now) {
+  const WaitReason reason = context.runtime.loop().telemetry().wait_reason();
+  const std::string text = no_force_text(now.state, now.cause, reason, context.runtime.config().profile);
+  return text.empty() ? Json(nullptr) : Json(text);
+}
+
 Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
   const Lease& lease = context.lease;
   Json armed_by = nullptr;
@@ -56,6 +64,7 @@ Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
   return {{"sequence", now.sequence},
           {"state", name(now.state)},
           {"cause", fault_json(now.cause)},
+          {"no_force", no_force_json(context, now)},
           {"last_fault", last_fault_json(now)},
           {"armed_by", armed_by},
           {"lease", lease.holder() ? Json(lease.holder()->identity) : Json(nullptr)},

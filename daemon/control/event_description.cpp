@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/transitions.hpp"
+#include "daemon/wait_text.hpp"
 
 namespace wrenchd {
 namespace {
@@ -92,6 +93,17 @@ EventDescription describe_event(const Event::ProxySearchFailed&) {
           "repeats. "
           "Move the handle to where the tool has room",
           {{"outcome", "failed"}}};
+}
+
+EventDescription describe_event(const Event::Waits& e) {
+  return {"waits",
+          EventLevel::warning,
+          fmt::format("{}: {}", name(e.state), wait_text(e.reason)),
+          {{"state", name(e.state)},
+           {"reason", name(e.reason.kind)},
+           {"fault", fault_json(e.reason.fault)},
+           {"value", e.reason.value},
+           {"limit", e.reason.limit}}};
 }
 
 EventDescription describe_event(const Event::Released&) {

@@ -50,7 +50,7 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
 }  // namespace
 
 std::span<const EventRow> feed_events() {
-  static const std::array<EventRow, 10> rows = {{
+  static const std::array<EventRow, 11> rows = {{
       {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "A fault was raised. fault: name, message and cure; value: its measured size, or 0; recording: the "
@@ -68,6 +68,13 @@ std::span<const EventRow> feed_events() {
        "The search for a feasible pose of the tool, after each arming. outcome: searching, found "
        "(distance_m: from the "
        "hand), failed, projection_infeasible."},
+      {"waits",
+       "An armed loop or a self-test has waited for a second for the same condition. reason: no_report, "
+       "not_homed, fault, "
+       "proxy_search, no_room, handle_moves, handle_turns, contact_pushes, contact_twists; fault: the fault "
+       "that repeats, or "
+       "null; value, limit: what the condition compares, in SI units. Method 'status' has the present "
+       "numbers."},
       {"released", "The hand was released: zero wrench, motors off."},
       {"scene",
        "Another rendering replaces the active one. rendering_id: its number, as in the tick record; "

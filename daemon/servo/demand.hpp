@@ -3,6 +3,7 @@
 
 #include "core/device_profile.hpp"
 #include "core/spatial.hpp"
+#include "daemon/servo/calm_condition.hpp"
 #include "daemon/servo/contact_state.hpp"
 
 namespace wrenchd {
@@ -18,7 +19,7 @@ struct Demand {
       kNoDof;  ///< Components of either that are left out because the device has no motors for them.
   Wrench F_T;  ///< Of the contact alone, about the origin and in the axes of the body frame T.
   bool sample_usable = false;
-  bool calm = false;  ///< The handle is slow, and full authority would not push it much.
+  CalmCondition calm;  ///< The handle is slow, and full authority would not push it much.
   bool interrupted =
       false;  ///< The proxy became invalid in this tick, and not by a command: the ramp starts again.
   bool proxy_invalidated = false;  ///< The proxy became invalid in this tick, by a command or not.

@@ -11,6 +11,7 @@
 #include "core/clock.hpp"
 #include "core/fault.hpp"
 #include "core/state.hpp"
+#include "daemon/servo/wait_reason.hpp"
 
 namespace wrenchd {
 
@@ -44,6 +45,11 @@ struct Event {
   };
   /// No feasible pose was found; the search is repeated.
   struct ProxySearchFailed {};
+  /// The loop has waited for the same condition for a second.
+  struct Waits {
+    State state;
+    WaitReason reason;
+  };
   /// The hand was released: zero wrench, motors off.
   struct Released {};
   struct CrossfadeStarted {
@@ -54,7 +60,7 @@ struct Event {
   };
   using Data = std::variant<StateChanged, FaultRaised, StiffnessScaled, StabilityBoundUnknown, ArmingRejected,
                             ProjectionInfeasible, ProxySearchStarted, ProxyFound, ProxySearchFailed, Released,
-                            CrossfadeStarted, RenderingChanged>;
+                            CrossfadeStarted, RenderingChanged, Waits>;
 
   TimePoint at{};  ///< Start of the tick in which it happened, on the monotonic clock.
   Data data;

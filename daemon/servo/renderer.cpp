@@ -235,7 +235,7 @@ Demand Renderer::compute_wrench(const ContactState& contact, const DeviceSample&
   demand_.next_rendering_weight = crossfade_.next_weight();
   demand_.in_contact = crossfade_.in_contact() && contact_gain_ > 0.0;
   demand_.stored_energy_J = contact_gain_ * crossfade_.stored_energy_J();
-  demand_.calm = is_calm(sample, limits);
+  demand_.calm = calm_condition(contact, sample, limits);
   demand_.F_T = active().F_T();
   demand_.contact = contact;
   Demand demand = demand_;
@@ -300,13 +300,23 @@ bool Renderer::update_contact_gain(const TickTime& t) noexcept {
   return true;
 }
 
-bool Renderer::is_calm(const DeviceSample& sample,
-                       const RenderingCrossfade::FadeLimits& limits) const noexcept {
-  const Wrench& F = demand_.F_contact;
-  return proxy_valid() && has_sample_time_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
-         sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
-         F.force_N.norm() <= kCalmLimitFraction * limits.max_force_N &&
-         F.torque_Nm.norm() <= kCalmLimitFraction * limits.max_torque_Nm;
+CalmCondition Renderer::calm_condition(const ContactState& contact, const DeviceSample& sample,
+                                       const RenderingCrossfade::FadeLimits& limits) const noexcept {
+  CalmCondition c;
+  c.proxy_valid = proxy_valid();
+  c.sampled = has_sample_time_;
+  c.speed_m_per_s = sample.V_BH.linear_m_per_s.norm();
+  c.angular_speed_rad_per_s = sample.V_BH.angular_rad_per_s.norm();
+  c.force_N = demand_.F_contact.force_N.norm();
+  c.torque_Nm = demand_.F_contact.torque_Nm.norm();
+  c.max_force_N = kCalmLimitFraction * limits.max_force_N;
+  c.max_torque_Nm = kCalmLimitFraction * limits.max_torque_Nm;
+  if (!contact.following()) return c;
+  const Pose X_WH_at_proxy = contact.X_WQ * inverse(active().X_HT());
+  const Vector3d to_proxy_m = (X_WH_at_proxy.translation_m - contact.X_WH.translation_m) / workspace_.scale();
+  c.to_proxy_W_m = {to_proxy_m.x(), to_proxy_m.y(), to_proxy_m.z()};
+  c.to_proxy_rad = contact.eps.tail<3>().norm();
+  return c;
 }
 
 void Renderer::forget_device() noexcept {

@@ -77,7 +77,8 @@ class Renderer {
                       const TickTime& t) noexcept;
   Wrench contact_wrench(const Rendering& rendering) const noexcept;
   Wrench local_model_wrench(const DeviceSample& sample, const TickTime& t) noexcept;
-  bool is_calm(const DeviceSample& sample, const RenderingCrossfade::FadeLimits& limits) const noexcept;
+  CalmCondition calm_condition(const ContactState& contact, const DeviceSample& sample,
+                               const RenderingCrossfade::FadeLimits& limits) const noexcept;
   void invalidate_proxy(TimePoint now) noexcept;
   void adopt_rendering(TimePoint now) noexcept;
   void scale_renderings() noexcept;

@@ -106,7 +106,7 @@ State Supervisor::preview(const Demand& demand, const DeviceSample& sample, Time
   if (demand.interrupted) next.on(Trigger::interrupted);
   if (projection_failed(demand)) next.on(Fault::projection_failed);
   if (wrench_late(demand, sample, ready)) next.on(Fault::wrench_late);
-  next.advance(demand.calm, t.dt_s);
+  next.advance(demand.calm.holds(), t.dt_s);
   return next.state();
 }
 
@@ -116,7 +116,7 @@ Authority Supervisor::authorise(const Demand& demand, const Stabilized& contact,
   if (projection_failed(demand)) raise(Fault::projection_failed, t.now);
   if (demand.sample_usable) infeasible_ticks_ = demand.contact.infeasible() ? infeasible_ticks_ + 1 : 0;
   if (wrench_late(demand, sample, ready)) raise(Fault::wrench_late, t.now, seconds(ready - sample.arrived));
-  machine_.advance(demand.calm, t.dt_s);
+  machine_.advance(demand.calm.holds(), t.dt_s);
   raise(contact.faults, t.now);
 
   Authority authority;

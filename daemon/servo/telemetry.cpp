@@ -6,6 +6,9 @@
 namespace wrenchd {
 namespace {
 
+/// A wait this long is reported.
+constexpr Duration kLongWait = std::chrono::seconds(1);
+
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
 std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
@@ -112,6 +115,10 @@ void Telemetry::publish(const TickResult& tick, const Supervisor& supervisor,
   record_ = make_record(tick, supervisor);
   totals_.add(record_);
   emit_changes(supervisor, tick.demand, tick.time.now);
+  show_wait(supervisor.state(),
+            wrenchd::wait_reason(supervisor.state(), supervisor.faults(), tick.reading.sample, tick.demand,
+                                 tick.time.now),
+            tick.time.now);
   if (tick.released) events_.emit(tick.time.now, Event::Released{});
   const ContactState& contact = tick.demand.contact;
   if (tick.demand.sample_usable) handle_pose_.write({contact.X_WH, tick.time.scene_time_s, tick.time.now});
@@ -129,6 +136,7 @@ void Telemetry::publish_release(TimePoint now, const Supervisor& supervisor, con
   record_demand(demand, record_);
   record_state(supervisor, record_);
   emit_changes(supervisor, demand, now);
+  show_wait(supervisor.state(), {}, now);
   events_.emit(now, Event::Released{});
   show(rendering, demand.contact.crossfading);
 }
@@ -163,6 +171,29 @@ void Telemetry::emit_proxy_changes(const ContactState& contact, TimePoint now) n
   if (contact.infeasible() && reported_status_ != ProjectionStatus::infeasible)
     events_.emit(now, Event::ProjectionInfeasible{});
   reported_status_ = contact.status;
+}
+
+/// A wait is reported after a second, because a hand that comes to rest sooner needs no advice, and again a
+/// second later if another condition keeps the force away.
+void Telemetry::show_wait(State state, const WaitReason& reason, TimePoint now) noexcept {
+  latest_wait_.write(reason);
+  if (state != State::waiting && state != State::self_test)
+    waiting_ = false;
+  else if (!waiting_) {
+    waiting_ = true;
+    wait_reported_ = now;
+    reported_wait_ = WaitReason::Kind::none;
+  }
+  if (!waiting_ || reason.kind == reported_wait_ || now - wait_reported_ < kLongWait) return;
+  wait_reported_ = now;
+  reported_wait_ = reason.kind;
+  if (reason.kind != WaitReason::Kind::none) events_.emit(now, Event::Waits{state, reason});
+}
+
+WaitReason Telemetry::wait_reason() {
+  const std::lock_guard lock(wait_mutex_);
+  latest_wait_.read(last_wait_);
+  return last_wait_;
 }
 
 void Telemetry::count_times(const TickTime& time, const StageTimes& stage_ns, Duration elapsed) noexcept {

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <mutex>
 
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
@@ -17,6 +18,7 @@
 #include "daemon/servo/shared_state.hpp"
 #include "daemon/servo/supervisor.hpp"
 #include "daemon/servo/tick_record.hpp"
+#include "daemon/servo/wait_reason.hpp"
 
 namespace wrenchd {
 
@@ -86,6 +88,8 @@ class Telemetry {
   LimitSettings limits() const noexcept;
   /// The newest record. One thread.
   LatestValue<TickRecord>& latest_record() noexcept { return latest_record_; }
+  /// What the loop waited for in the last tick. Any thread but the servo thread: readers wait for each other.
+  WaitReason wait_reason();
   /// Where the handle was in the last tick with a usable sample. One thread.
   HandlePose handle_pose() noexcept {
     handle_pose_.read(last_handle_pose_);
@@ -95,6 +99,7 @@ class Telemetry {
  private:
   void emit_changes(const Supervisor& supervisor, const Demand& demand, TimePoint now) noexcept;
   void emit_proxy_changes(const ContactState& contact, TimePoint now) noexcept;
+  void show_wait(State state, const WaitReason& reason, TimePoint now) noexcept;
   void show(const Rendering& rendering, bool crossfading) noexcept;
 
   EventQueue events_;
@@ -104,6 +109,9 @@ class Telemetry {
   ProjectionStatus reported_status_ = ProjectionStatus::free;
   bool reported_proxy_valid_ = true;
   bool reported_search_failed_ = false;
+  bool waiting_ = false;       ///< The loop waited in the previous tick.
+  TimePoint wait_reported_{};  ///< When the wait began, or was reported last.
+  WaitReason::Kind reported_wait_ = WaitReason::Kind::none;
 
   std::atomic<State> state_{State::disconnected};
   std::atomic<Fault> cause_{Fault::none};
@@ -113,6 +121,9 @@ class Telemetry {
   LoopTiming timing_;
   LoopTotals totals_;
   LatestValue<TickRecord> latest_record_;
+  LatestValue<WaitReason> latest_wait_;
+  std::mutex wait_mutex_;  ///< Of the readers of latest_wait_.
+  WaitReason last_wait_;   ///< Protected by wait_mutex_.
   LatestValue<HandlePose> handle_pose_;
   HandlePose last_handle_pose_;  ///< Belongs to the reader of handle_pose().
 };

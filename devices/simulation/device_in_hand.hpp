@@ -18,6 +18,10 @@ class DeviceInHand : public EmulatedDevice {
   /// Sets the displayed handle pose in B, for a device with a steered pose. The hand observes it. RT-safe.
   virtual void observe_pose(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
 
+  /// Displaces the whole path of the hand, in B [m], and the handle with it. Returns false if the device does
+  /// not start on its path. Precondition: the device has not been advanced. Not RT-safe.
+  virtual bool displace_path(const Vector3d& /*d_B_m*/) { return false; }
+
   // True state of the handle, for tests; the encoders may report a different one.
   virtual const Pose& X_BH() const noexcept = 0;
   virtual const Wrench& motor_wrench() const noexcept = 0;  ///< wrench on the hand, about H, in B

@@ -68,6 +68,12 @@ HandPath::HandPath(const SimulationSettings& settings)
 }
 
 HandTarget HandPath::at(Duration since_start) const noexcept {
+  HandTarget target = undisplaced(since_start);
+  target.X_BG.translation_m += displacement_B_m_;
+  return target;
+}
+
+HandTarget HandPath::undisplaced(Duration since_start) const noexcept {
   if (spline_) return spline_->at(since_start);
   if (segments_.empty() || (!repeats_ && since_start >= end_)) return final_target_;
   const Duration t = std::max(since_start, Duration{0}) % end_;

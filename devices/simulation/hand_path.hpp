@@ -33,7 +33,12 @@ class HandPath {
   /// the hand stays at the last waypoint. RT-safe.
   HandTarget at(Duration since_start) const noexcept;
 
+  /// Displaces the path, in B [m]. RT-safe.
+  void displace(const Vector3d& d_B_m) noexcept { displacement_B_m_ += d_B_m; }
+
  private:
+  HandTarget undisplaced(Duration since_start) const noexcept;
+
   struct Segment {
     Duration start;
     Duration length;
@@ -44,6 +49,7 @@ class HandPath {
 
   std::vector<Segment> segments_;  ///< one segment per pair of waypoints
   HandTarget final_target_;
+  Vector3d displacement_B_m_ = Vector3d::Zero();
   Duration end_{};
   bool repeats_;
   std::optional<PoseSpline> spline_;  ///< recorded path; replaces the segments if it is set

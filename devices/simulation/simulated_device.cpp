@@ -73,6 +73,13 @@ SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationS
   firmware_.initialize_encoders(handle_.X_BH());
 }
 
+bool SimulatedDevice::displace_path(const Vector3d& d_B_m) {
+  path_.displace(d_B_m);
+  handle_.reset_to(path_.at(Duration{0}).X_BG);
+  firmware_.initialize_encoders(handle_.X_BH());
+  return true;
+}
+
 void SimulatedDevice::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
     powered_ = true;

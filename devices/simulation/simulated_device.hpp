@@ -41,6 +41,7 @@ class SimulatedDevice final : public DeviceInHand {
   // True state of the handle, for tests; the encoders may report a different one.
   TimePoint now() const noexcept { return now_; }
   const Pose& X_BH() const noexcept override { return handle_.X_BH(); }
+  bool displace_path(const Vector3d& d_B_m) override;
   const Twist& V_BH() const noexcept { return handle_.V_BH(); }
   const Wrench& motor_wrench() const noexcept override { return handle_.motor_wrench(); }
   HandTarget hand_target() const noexcept override { return path_.at(now_ - power_on_); }

@@ -583,7 +583,7 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
        "doctor, "
        "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, "
        "gallery, "
-       "paper, replay, export, plot, sweep) is required"},
+       "new, paper, replay, export, plot, sweep) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},

@@ -77,8 +77,9 @@ fs::path PageFiles::directory() {
   const fs::path installed = "/usr/share/wrenchd/view";
   for (const fs::path& place : {beside, installed})
     if (fs::exists(place / "index.html")) return place;
-  throw std::runtime_error("the page of the view is missing; searched " + beside.string() + ", " +
-                           installed.string() + "; build it (target view_page), or install wrenchd");
+  throw std::runtime_error(
+      "the page of the view is missing; searched " + beside.string() + ", " + installed.string() +
+      "; build it (target view_page; needs npm, and WRENCHD_VIEW on), or install wrenchd");
 }
 
 }  // namespace wrenchd

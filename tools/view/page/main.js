@@ -23,6 +23,7 @@ let frame = null;
 let link = null;
 let rate_Hz = 0;
 let lastFault = null;
+let waits = null;  // the last event that says what the loop waits for
 let times = null;
 let connected = false;
 let sceneTriangles = 0;
@@ -100,7 +101,11 @@ function showCause(now) {
   if (mode === "live" && !connected) return;
   const cause = now.cause;
   const bad = now.state === "fault" || now.state === "stopped" || now.state === "degraded" || now.state === "disconnected";
-  if (cause === "none" || !bad) {
+  const waiting = now.state === "waiting" || now.state === "self_test";
+  if (!waiting) waits = null;
+  if (waiting && waits && mode === "live") {
+    showBanner("warn", now.state === "waiting" ? "No force yet" : "Self-test", sentence(link?.status?.no_force ?? waits.text), "");
+  } else if (cause === "none" || !bad) {
     $("banner").hidden = true;
   } else {
     const known = faults[cause] ?? link?.status?.cause ?? { message: "", cure: "" };
@@ -285,6 +290,7 @@ const connection = new Connection({
   },
   event({ event }) {
     if (event.name === "arming_rejected" || event.name === "reload") toast(event.text);
+    if (event.name === "waits") waits = event;
     if (event.name === "marker") set("marker", markerText(event));
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
