@@ -170,7 +170,7 @@ std::unique_ptr<SimulatedLink> make_scripted_link(const RunConfig& config, const
 void start_clear(const Runtime& runtime, DeviceInHand& device) {
   const Settings& settings = runtime.config().settings;
   if (!settings.simulation.playback_path.empty()) return;  // recorded poses stay as they are
-  const auto d_B_m = displacement_to_clear_start(runtime.scene(), settings, device.X_BH());
+  const auto d_B_m = displacement_to_clear_start(runtime.scene(), settings);
   if (!d_B_m)
     spdlog::warn(
         "the simulated hand starts where the tool overlaps an obstacle, and no pose near it is free: it will "

@@ -173,21 +173,24 @@ void Telemetry::emit_proxy_changes(const ContactState& contact, TimePoint now) n
   reported_status_ = contact.status;
 }
 
-/// A wait is reported after a second, because a hand that comes to rest sooner needs no advice, and again a
-/// second later if another condition keeps the force away.
+/// A wait is reported after a second, because a hand that comes to rest sooner needs no advice. Each
+/// condition that keeps the force away is reported once in a wait, at least a second after the one before.
 void Telemetry::show_wait(State state, const WaitReason& reason, TimePoint now) noexcept {
   latest_wait_.write(reason);
-  if (state != State::waiting && state != State::self_test)
-    waiting_ = false;
-  else if (!waiting_) {
-    waiting_ = true;
+  const bool waited = waiting_;
+  waiting_ = state == State::waiting || state == State::self_test;
+  if (!waiting_ || !waited) {
     wait_reported_ = now;
-    reported_wait_ = WaitReason::Kind::none;
+    reported_waits_ = 0;
+    return;
   }
-  if (!waiting_ || reason.kind == reported_wait_ || now - wait_reported_ < kLongWait) return;
+  const unsigned kind = 1U << static_cast<unsigned>(reason.kind);
+  if (reason.kind == WaitReason::Kind::none || (reported_waits_ & kind) != 0 ||
+      now - wait_reported_ < kLongWait)
+    return;
   wait_reported_ = now;
-  reported_wait_ = reason.kind;
-  if (reason.kind != WaitReason::Kind::none) events_.emit(now, Event::Waits{state, reason});
+  reported_waits_ |= kind;
+  events_.emit(now, Event::Waits{state, reason});
 }
 
 WaitReason Telemetry::wait_reason() {

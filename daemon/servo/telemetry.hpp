@@ -109,9 +109,9 @@ class Telemetry {
   ProjectionStatus reported_status_ = ProjectionStatus::free;
   bool reported_proxy_valid_ = true;
   bool reported_search_failed_ = false;
-  bool waiting_ = false;       ///< The loop waited in the previous tick.
-  TimePoint wait_reported_{};  ///< When the wait began, or was reported last.
-  WaitReason::Kind reported_wait_ = WaitReason::Kind::none;
+  bool waiting_ = false;         ///< The loop waited in the previous tick.
+  TimePoint wait_reported_{};    ///< When the wait began, or was reported last.
+  unsigned reported_waits_ = 0;  ///< Kinds that were reported in this wait, one bit each.
 
   std::atomic<State> state_{State::disconnected};
   std::atomic<Fault> cause_{Fault::none};
