@@ -13,7 +13,7 @@ namespace {
 /// The commands by which all of this was built, one a source, words apart. CMake writes one entry a line
 /// pair, so no more of JSON is needed than to find the "command" and undo its escapes.
 std::vector<std::vector<std::string>> commands() {
-  std::ifstream file(test::program_path("../compile_commands.json"));
+  std::ifstream file(wrenchd::test::program_path("../compile_commands.json"));
   std::vector<std::vector<std::string>> all;
   for (std::string line; std::getline(file, line);) {
     const std::string key = "\"command\": \"";

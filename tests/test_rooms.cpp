@@ -33,7 +33,7 @@ struct Include {
 std::vector<Include> includes_of(const std::string& room) {
   std::vector<Include> found;
   const std::regex line(R"re(^\s*#include\s+["<]([^">]+)[">])re");
-  for (const auto& entry : fs::recursive_directory_iterator(fs::path(test::source_path()) / room)) {
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(wrenchd::test::source_path()) / room)) {
     const std::string extension = entry.path().extension();
     if (extension != ".hpp" && extension != ".cpp") continue;
     std::ifstream in(entry.path());
@@ -75,7 +75,7 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
 
 TEST_CASE("the firmware reference includes only the integer headers of C99", "[rooms]") {
   for (const char* file : {"wrench_firmware.h", "wrench_firmware.c"}) {
-    std::ifstream in(fs::path(test::source_path("devices/firmware")) / file);
+    std::ifstream in(fs::path(wrenchd::test::source_path("devices/firmware")) / file);
     REQUIRE(in);
     const std::regex line(R"re(^\s*#include\s+["<]([^">]+)[">])re");
     std::smatch match;

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path kSource = test::source_path();
+const fs::path kSource = wrenchd::test::source_path();
 constexpr const char* kThisFile = "tests/core/test_citations.cpp";
 
 std::string read(const fs::path& file) {

@@ -59,7 +59,9 @@ TEST_CASE("a looser limit that the armed loop ignores is not in the status", "[s
 
 TEST_CASE("the status names the present scene", "[status]") {
   const TemporaryDirectory files;
-  const auto file = files.write("empty.toml", "[tool]\nmesh = \"" + test::source_path("config/meshes/cube.off") + "\"\nscale = 0.001\nmass = 0.2\n";
+  const auto file =
+      files.write("empty.toml", "[tool]\nmesh = \"" + test::source_path("config/meshes/cube.off") +
+                                    "\"\nscale = 0.001\nmass = 0.2\n");
   Rig r;
   CHECK(r.status()["scene"]["file"] == r.s.runtime.config().scene.file.string());
   CHECK(r.status()["scene"]["obstacles"] == 1);
