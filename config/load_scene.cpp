@@ -9,6 +9,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "config/near_file.hpp"
 #include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
 #include "core/generated_mesh.hpp"
@@ -83,10 +84,13 @@ void read_mesh(const TomlValue& value, const SceneReading& reading, fs::path& me
                         "); store it there, or let an administrator name it in the scene");
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
+  const fs::path near = reading.scope.restricted() ? fs::path() : near_file(mesh);
   value.reject(
       "no such file; searched " + fs::absolute(mesh).lexically_normal().string() +
-      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as in { make "
-      "= \"gear\" }");
+      (near.empty()
+           ? "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as "
+             "in { make = \"gear\" }"
+           : "; did you mean '" + near.lexically_normal().string() + "'?"));
 }
 
 /// Reads a list of mesh file names: the parts of one body. mesh: receives the first one.

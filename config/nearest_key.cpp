@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <numeric>
 #include <utility>
 
@@ -64,6 +65,21 @@ const KnownKey* nearest(std::string_view unknown, const std::vector<KnownKey>& k
   return best;
 }
 
+/// A name of fewer letters begins too many other names.
+constexpr std::size_t kMinBeginning = 3;
+
+/// Largest number of edits between a name and what a user typed instead.
+std::size_t tolerated_edits(std::string_view unknown) {
+  return std::clamp<std::size_t>(unknown.size() / 3, 2, 8);
+}
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower;
+}
+
 std::string list(const std::vector<KnownKey>& known) {
   std::string names;
   for (const KnownKey& key : known) names += (names.empty() ? "'" : ", '") + key.name + "'";
@@ -103,10 +119,35 @@ NearestKey nearest_key(std::string_view unknown, const std::vector<KnownKey>& kn
     return {same->name, "give it in " + readable_unit(same->unit) + " as '" + same->name + "'"};
   }
   const KnownKey* near = same ? same : nearest(unknown, known, false);
-  const std::size_t tolerated = std::clamp<std::size_t>(unknown.size() / 3, 2, 8);
-  if (same || edits(unknown, near->name) <= tolerated)
+  if (same || edits(unknown, near->name) <= tolerated_edits(unknown))
     return {near->name, "did you mean '" + near->name + "'?"};
   return {"", "known keys here: " + list(known)};
+}
+
+std::string nearest_name(std::string_view unknown, const std::vector<std::string>& known) {
+  const std::string typed = lower_case(unknown);
+  const std::string* best = nullptr;
+  const std::string* longer = nullptr;
+  std::size_t least = tolerated_edits(typed) + 1, longer_names = 0;
+  for (const std::string& name : known) {
+    const std::string candidate = lower_case(name);
+    if (typed.size() >= kMinBeginning && candidate.starts_with(typed)) {
+      longer = &name;
+      ++longer_names;
+    }
+    // A short name of which every letter must change is another name.
+    const std::size_t distance = edits(typed, candidate);
+    if (distance >= least || distance >= std::max(typed.size(), candidate.size())) continue;
+    least = distance;
+    best = &name;
+  }
+  if (longer_names == 1 && least > 1) return *longer;
+  return best ? *best : "";
+}
+
+std::string nearest_name_advice(std::string_view unknown, const std::vector<std::string>& known) {
+  const std::string name = nearest_name(unknown, known);
+  return name.empty() ? "" : "; did you mean '" + name + "'?";
 }
 
 }  // namespace wrenchd

@@ -29,4 +29,11 @@ std::string readable_unit(std::string_view unit);
 /// list of all known keys. Not RT-safe: allocates.
 NearestKey nearest_key(std::string_view unknown, const std::vector<KnownKey>& known);
 
+/// The name that was probably meant by a mistyped one: the only one that begins with it, otherwise the one
+/// with the fewest edits, upper and lower case alike. Empty: no name is near. Not RT-safe: allocates.
+std::string nearest_name(std::string_view unknown, const std::vector<std::string>& known);
+
+/// Returns "; did you mean 'NAME'?", or "" if no name is near. Not RT-safe: allocates.
+std::string nearest_name_advice(std::string_view unknown, const std::vector<std::string>& known);
+
 }  // namespace wrenchd

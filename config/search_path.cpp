@@ -4,10 +4,17 @@
 #include <utility>
 
 #include "config/config_error.hpp"
+#include "config/near_file.hpp"
 #include "config/toml_files.hpp"
 
 namespace wrenchd {
 namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kProfiles = "profiles";
+constexpr const char* kProfileExtension = ".toml";
+
+}  // namespace
 
 SearchPath::SearchPath()
     : SearchPath({"/etc/wrenchd", "/usr/share/wrenchd"
@@ -44,7 +51,7 @@ fs::path SearchPath::require(const fs::path& name) const {
   return *found;
 }
 
-std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in) const {
+std::string SearchPath::searched(const fs::path& name, const fs::path& named_in) const {
   std::string places;
   for (const fs::path& place : candidates(name, named_in)) {
     places += (places.empty() ? "" : ", ") + fs::absolute(place).lexically_normal().string();
@@ -52,12 +59,28 @@ std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in
   return "no such file; searched " + places;
 }
 
+std::string SearchPath::advice(const fs::path& name, const fs::path& named_in) const {
+  // A profile is named without its directory and extension, as in --profile polhem.
+  const bool profile = name.parent_path() == kProfiles && name.extension() == kProfileExtension;
+  for (const fs::path& place : candidates(name, named_in)) {
+    const fs::path near = near_file(place);
+    if (near.empty()) continue;
+    return "; did you mean '" + (profile ? near.stem() : near.lexically_normal()).string() + "'?";
+  }
+  return {};
+}
+
+std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in) const {
+  return searched(name, named_in) + advice(name, named_in);
+}
+
 fs::path profile_file(const std::string& name) {
-  return name.ends_with(".toml") ? fs::path(name) : fs::path("profiles") / (name + ".toml");
+  return name.ends_with(kProfileExtension) ? fs::path(name)
+                                           : fs::path(kProfiles) / (name + kProfileExtension);
 }
 
 std::vector<fs::path> profile_files(const SearchPath& search) {
-  return toml_files("profiles", search);
+  return toml_files(kProfiles, search);
 }
 
 }  // namespace wrenchd

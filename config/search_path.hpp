@@ -32,6 +32,11 @@ class SearchPath {
   /// The first existing candidate; throws ConfigError with all candidates if none exists.
   std::filesystem::path require(const std::filesystem::path& name) const;
   /// The message "no such file; searched A, B, C".
+  std::string searched(const std::filesystem::path& name, const std::filesystem::path& named_in = {}) const;
+  /// Returns "; did you mean 'D'?" if a file of a similar name exists, else "". It shows the name of a file,
+  /// so it is for users who may list the directories.
+  std::string advice(const std::filesystem::path& name, const std::filesystem::path& named_in = {}) const;
+  /// searched() and advice().
   std::string not_found(const std::filesystem::path& name, const std::filesystem::path& named_in = {}) const;
 
  private:

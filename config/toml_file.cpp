@@ -9,6 +9,8 @@
 
 #include <toml++/toml.h>
 
+#include "config/near_file.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -24,13 +26,20 @@ constexpr int kMaxDepth = 16;
 /// with 500,000 dots would overflow the stack. wrenchd's formats need less than a tenth of this limit.
 constexpr std::ptrdiff_t kMaxDotsInLine = 120;
 
+/// Names a file of a similar name only if the name comes from a user of this process, not from a client.
+std::string missing_text(const fs::path& file, const FileScope& scope) {
+  const fs::path near = scope.restricted() ? fs::path() : near_file(file);
+  return "no such file; searched " + fs::absolute(file).string() +
+         (near.empty() ? "" : "; did you mean '" + near.string() + "'?");
+}
+
 std::string read_text(const fs::path& file, const FileScope& scope) {
   try {
     return read_file(file, kMaxBytes, scope);
   } catch (const FileError& error) {
     switch (error.problem()) {
       case FileProblem::missing:
-        throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
+        throw ConfigError(file, {}, missing_text(file, scope));
       case FileProblem::too_large:
         throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
       default:

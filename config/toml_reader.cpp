@@ -128,7 +128,12 @@ bool TomlValue::choose(std::size_t& index, std::span<const std::string_view> wor
   if (!node_) return false;
   const auto* word = std::get_if<std::string>(&node_->value);
   const auto found = word ? std::find(words.begin(), words.end(), *word) : words.end();
-  if (found == words.end()) return reject_found(alternatives(words));
+  if (found == words.end()) {
+    const std::string advice =
+        word ? nearest_name_advice(*word, std::vector<std::string>(words.begin(), words.end())) : "";
+    reject("expected " + alternatives(words) + ", found " + describe(*node_) + advice);
+    return false;
+  }
   index = static_cast<std::size_t>(found - words.begin());
   return true;
 }

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "daemon/command_line.hpp"
 #include "daemon/daemon_run.hpp"
 #include "daemon/log_output.hpp"
 #include "daemon/options.hpp"
@@ -38,6 +39,7 @@ int main(int argc, char** argv) {
   CLI::App app;
   wrenchd::Options options;
   wrenchd::add_options(app, options);
+  wrenchd::advise_on_mistakes(app);
   CLI11_PARSE(app, argc, argv);
   wrenchd::LogOutput log(options.verbose);
   const int code = run(options, log);

@@ -44,7 +44,7 @@ void add_device_options(CLI::App& app, Options& options) {
   app.add_option("--playback-mode", options.playback_mode,
                  "replaces the mode of the configuration. open: the handle follows the poses, whatever force "
                  "acts;\nclosed: the simulated hand pulls the handle to the poses")
-      ->check(CLI::IsMember({"open", "closed"}));
+      ->check(one_of({"open", "closed"}));
   app.add_option("--link-fd", options.link_fd,
                  "inherited SOCK_SEQPACKET socket to a device in another process, which uses the protocol of "
                  "the profile\n(devices/README.md)")
@@ -55,7 +55,7 @@ void add_device_options(CLI::App& app, Options& options) {
 void add_run_options(CLI::App& app, Options& options) {
   app.add_option("--realtime", options.realtime,
                  "replaces the mode of the configuration: required, best_effort, off")
-      ->check(CLI::IsMember({"required", "best_effort", "off"}));
+      ->check(one_of({"required", "best_effort", "off"}));
   app.add_option("--control", options.control,
                  "path of the control socket; replaces the path of the configuration; none: no socket")
       ->check(not_empty());

@@ -5,6 +5,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/near_file.hpp"
 #include "core/watch_limits.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/recording/recorded_inputs.hpp"
@@ -18,8 +19,10 @@ std::filesystem::path find_file(const std::filesystem::path& name, const SearchP
   std::error_code error;
   if (std::filesystem::exists(given, error)) return given;
   if (const auto found = search.find(name)) return *found;
+  const std::filesystem::path near = near_file(name);
   throw ConfigError(name, {},
-                    search.not_found(name) + ", and from here " + given.lexically_normal().string());
+                    search.searched(name) + ", and from here " + given.lexically_normal().string() +
+                        (near.empty() ? search.advice(name) : "; did you mean '" + near.string() + "'?"));
 }
 
 /// Returns the highest tick rate: the configured rate, or the report rate if each report starts a tick.

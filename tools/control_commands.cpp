@@ -19,6 +19,7 @@
 #include <unistd.h>
 #include <wrenchd/client.hpp>
 
+#include "config/nearest_key.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/owned_fd.hpp"
 #include "tools/output_file.hpp"
@@ -290,9 +291,14 @@ void run_describe(const ControlOptions& options) {
       print(fmt::format("    {}: {}{}; {}\n", name, param["type"].get<std::string>(),
                         param["required"].get<bool>() ? "" : ", optional", param["doc"].get<std::string>()));
   }
-  if (!found)
-    throw std::runtime_error("there is no method '" + options.method +
-                             "'; wrenchctl describe without a name lists the methods");
+  if (!found) {
+    std::vector<std::string> names;
+    for (const Json& method : all["methods"]) names.push_back(method["name"]);
+    const std::string advice = nearest_name_advice(options.method, names);
+    throw std::runtime_error(
+        "there is no method '" + options.method + "'" +
+        (advice.empty() ? "; wrenchctl describe without a name lists the methods" : advice));
+  }
   if (!options.method.empty()) return;
   print("\nevents\n");
   for (const Json& event : all["events"])

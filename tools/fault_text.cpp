@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "config/nearest_key.hpp"
 #include "core/fault.hpp"
 
 namespace wrenchd {
@@ -68,11 +70,15 @@ std::string fault_text() {
 
 std::string fault_text(const std::string& name) {
   std::string names;
+  std::vector<std::string> known;
   for (const FaultRow& row : fault_rows()) {
     if (row.name == name) return paragraph(row);
     names += (names.empty() ? "" : ", ") + std::string(row.name);
+    known.emplace_back(row.name);
   }
-  throw std::runtime_error("there is no fault '" + name + "'; the names are " + names);
+  const std::string advice = nearest_name_advice(name, known);
+  throw std::runtime_error("there is no fault '" + name + "'" +
+                           (advice.empty() ? "; the names are " + names : advice));
 }
 
 std::string state_machine_text() {

@@ -59,19 +59,19 @@ std::string gallery_text(const SearchPath& search) {
 
 std::string gallery_text(const SearchPath& search, const std::string& name) {
   const std::vector<GalleryScene> all = gallery(search);
-  std::vector<KnownKey> known;
+  std::vector<std::string> known;
   std::string names;
   for (const GalleryScene& scene : all) {
     if (scene.name == name)
       return paragraph(scene.description) + "\n    wrenchd --arm --live --config gallery/" + name +
              ".toml\n\n" + "or, in a source tree, tools/run " + name + ". The file is " +
              scene.file.string() + ".\n";
-    known.push_back({scene.name, ""});
+    known.push_back(scene.name);
     names += (names.empty() ? "" : ", ") + scene.name;
   }
-  const NearestKey nearest = nearest_key(name, known);
-  throw std::runtime_error("gallery: there is no '" + name + "'; " +
-                           (nearest.name.empty() ? "there are " + names : nearest.advice));
+  const std::string advice = nearest_name_advice(name, known);
+  throw std::runtime_error("gallery: there is no '" + name + "'" +
+                           (advice.empty() ? "; there are " + names : advice));
 }
 
 }  // namespace wrenchd

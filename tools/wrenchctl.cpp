@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/command_line.hpp"
 #include "daemon/standard_streams.hpp"
 #include "daemon/version.hpp"
 #include "tools/commands/subcommand.hpp"
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);  // optional, so that an unknown command appears by name in the error
   const auto commands = make_commands();
   for (const auto& command : commands) command->add_to(app);
+  advise_on_mistakes(app);
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
@@ -61,7 +63,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   } catch (const std::exception& error) {
-    print_note(error.what());
+    print_note(error.what() + file_advice(error.what(), argc, argv));
     return kExitRejected;
   }
 }

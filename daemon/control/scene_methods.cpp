@@ -67,7 +67,7 @@ std::filesystem::path scene_file(const std::string& name, const FileScope& scope
   std::error_code ignored;
   for (const std::filesystem::path& place : places)
     if (std::filesystem::exists(std::filesystem::symlink_status(place, ignored))) return place;
-  if (!places.empty()) throw ConfigError(name, {}, search.not_found(name));
+  if (!places.empty()) throw ConfigError(name, {}, search.searched(name));
   throw ConfigError(
       name, {},
       "lies outside of the directories from which clients may load files (" + scope.directories_text() +

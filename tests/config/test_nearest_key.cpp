@@ -69,4 +69,27 @@ TEST_CASE("a key that resembles no other is rejected with the list of keys", "[n
   CHECK(nearest_key("bananas", {}).advice == "no key is known here");
 }
 
+TEST_CASE("a mistyped name has the nearest name, upper and lower case alike", "[nearest_key]") {
+  const std::vector<std::string> commands = {"status", "arm", "stop", "gear", "acknowledge", "energy"};
+  for (const auto& [typed, meant] :
+       std::vector<std::pair<std::string, std::string>>{{"stauts", "status"},
+                                                        {"amr", "arm"},
+                                                        {"gaer", "gear"},
+                                                        {"enrgy", "energy"},
+                                                        {"STATUS", "status"},
+                                                        {"aknowlege", "acknowledge"},
+                                                        {"stat", "status"},
+                                                        {"ack", "acknowledge"},
+                                                        {"dance", ""},
+                                                        {"xyz", ""},
+                                                        {"", ""}}) {
+    INFO(typed);
+    CHECK(nearest_name(typed, commands) == meant);
+  }
+  CHECK(nearest_name_advice("gaer", commands) == "; did you mean 'gear'?");
+  CHECK(nearest_name_advice("dance", commands) == "");
+  CHECK(nearest_name(std::string(1'000'000, 'x'), commands) == "");
+  CHECK(nearest_name("gear", {}) == "");
+}
+
 }  // namespace wrenchd

@@ -43,6 +43,19 @@ TEST_CASE("a missing file is reported with all searched directories", "[search_p
       "wrenchd.toml: no such file; searched /nowhere/etc/wrenchd.toml, /nowhere/usr/wrenchd.toml");
 }
 
+TEST_CASE("a missing file is reported with a file of a similar name", "[search_path]") {
+  const TemporaryDirectory dir;
+  const SearchPath search({dir.path() / "etc", dir.path() / "usr"});
+  dir.write("usr/profiles/polhem.toml", "");
+  const auto scene = dir.write("usr/scenes/cube.toml", "");
+  CHECK_THROWS_WITH(search.require("scenes/cueb.toml"),
+                    Catch::Contains("did you mean '" + scene.string() + "'?"));
+  // A profile is named as on the command line.
+  CHECK_THROWS_WITH(search.require(profile_file("polhm")), Catch::Contains("; did you mean 'polhem'?"));
+  CHECK(search.searched("scenes/cueb.toml").find("did you mean") == std::string::npos);
+  CHECK(search.advice("scenes/gear.toml") == "");
+}
+
 TEST_CASE("the default directories contain the shipped files", "[search_path]") {
   CHECK(SearchPath().find("wrenchd.toml"));
   CHECK(SearchPath().candidates("x").front() == "/etc/wrenchd/x");

@@ -190,6 +190,8 @@ TEST_CASE("wrenchctl describe lists methods and roles", "[control_commands]") {
   const ProgramResult none = daemon.ctl({"describe", "dance"});
   CHECK(none.exit_code == 1);
   has(none.err, "there is no method 'dance'; wrenchctl describe without a name lists the methods");
+  has(daemon.ctl({"describe", "lease.aquire"}).err,
+      "there is no method 'lease.aquire'; did you mean 'lease.acquire'?");
 }
 
 TEST_CASE("wrenchctl names the searched sockets and the remedy", "[control_commands]") {

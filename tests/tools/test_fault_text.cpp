@@ -23,6 +23,7 @@ TEST_CASE("the fault text contains every fault with reaction and remedy", "[faul
 
 TEST_CASE("an unknown fault name is rejected with the list of names", "[fault_text]") {
   CHECK_THROWS_WITH(fault_text("hunger"), Contains("there is no fault 'hunger'") && Contains("overspeed"));
+  CHECK_THROWS_WITH(fault_text("tick_lat"), "there is no fault 'tick_lat'; did you mean 'tick_late'?");
 }
 
 TEST_CASE("the state machine is printed row by row", "[fault_text]") {

@@ -56,7 +56,7 @@ class DaemonCommands final : public Subcommand {
                            [this] { run_record(options_); });
     record->add_option("what", options_.method, "start, stop, mark, status, list or get")
         ->required()
-        ->check(CLI::IsMember({"start", "stop", "mark", "status", "list", "get"}));
+        ->check(one_of({"start", "stop", "mark", "status", "list", "get"}));
     record
         ->add_option(
             "file", options_.file,

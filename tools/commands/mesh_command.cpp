@@ -119,7 +119,7 @@ class MeshCommand final : public Subcommand {
       list += "  " + name + std::string(10 - name.size(), ' ') + description + '\n';
     }
     auto* make = mesh->add_option("--make", generated_.kind, "generate a solid of this kind, in metres")
-                     ->check(CLI::IsMember(kinds))
+                     ->check(one_of(kinds))
                      ->excludes(files);
     mesh->add_option("--triangles", generated_.triangles, "approximate number of triangles")
         ->check(CLI::Range(GeneratedMesh::kMinTriangles, GeneratedMesh::kMaxTriangles))

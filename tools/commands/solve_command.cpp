@@ -80,7 +80,7 @@ class SolveCommand final : public Subcommand {
         ->required()
         ->check(not_empty());
     solve->add_option("--method", method_, "projection method")
-        ->check(CLI::IsMember({"exact", "planar", "descent", "translational"}))
+        ->check(one_of({"exact", "planar", "descent", "translational"}))
         ->capture_default_str();
     solve->add_option("--planes", settings_.depth.planes, "N_delta of Eq. (40), for method planar")
         ->check(CLI::Range(1, 1000))
@@ -89,10 +89,10 @@ class SolveCommand final : public Subcommand {
         ->add_option("--contacts", contacts_,
                      "contact detection between meshes, for method exact: wrenchd's kernels, or CGAL's AABB\n"
                      "trees with exact predicates: the same contacts, much slower")
-        ->check(CLI::IsMember({"native", "cgal"}))
+        ->check(one_of({"native", "cgal"}))
         ->capture_default_str();
     solve->add_option("--law", law_, "wrench law: Eq. (16), or the gradient of (k/2) T")
-        ->check(CLI::IsMember({"pid", "energy"}))
+        ->check(one_of({"pid", "energy"}))
         ->capture_default_str();
     solve->add_option("--energy-stiffness", settings_.energy_stiffness_per_s2, "k of law energy [1/s2]")
         ->check(number_in_range(0.0, 1e9))
