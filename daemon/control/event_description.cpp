@@ -38,6 +38,11 @@ EventDescription describe_event(const Event::FaultRaised& e) {
 }
 
 EventDescription describe_event(const Event::StiffnessScaled& e) {
+  if (e.scale >= 1.0)
+    return {"stiffness",
+            EventLevel::info,
+            "the configured stiffness is within the stability bound; it is no longer scaled",
+            {{"scale", e.scale}}};
   return {"stiffness",
           EventLevel::warning,
           fmt::format(

@@ -60,9 +60,8 @@ std::span<const EventRow> feed_events() {
        "A device was connected or disconnected. present: a device is connected; reconnected: one was "
        "connected before."},
       {"stiffness",
-       "The self-test has derived the stiffness that stays passive. scale: share of the configured "
-       "stiffness; null: the "
-       "profile states no damping, so the stability bound is unknown."},
+       "The self-test, or another rendering, has changed the share of the configured stiffness that stays "
+       "passive. scale: this share; null: the profile states no damping, so the stability bound is unknown."},
       {"arming_rejected", "A request to arm was rejected. state: the state that does not allow it."},
       {"proxy_initialization",
        "The search for a feasible pose of the tool, after each arming. outcome: searching, found "

@@ -275,12 +275,15 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
   offer(std::move(rendering), config_.settings, std::move(scene), std::move(text), std::move(built));
 }
 
-void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesystem::path& source) {
+std::vector<ChangedValue> Reconfigurator::set_rendering(const TomlNode& changes,
+                                                        const std::filesystem::path& source) {
   const std::lock_guard lock(mutex_);
   Settings settings = config_.settings;
   change_rendering(changes, source, settings);
+  std::vector<ChangedValue> changed = changed_values(config_.settings, settings);
   auto rendering = build_rendering(settings, scene_);
   offer(std::move(rendering), settings, config_.scene, present_scene()->text, {scene_, {}, loaded_});
+  return changed;
 }
 
 void Reconfigurator::set_workspace(const WorkspaceRequest& request) {
@@ -451,6 +454,14 @@ Reconfigurator::CurrentRendering Reconfigurator::current_rendering() const {
 Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
   const auto present = present_scene();
   return {present->rendering_id, present->obstacle_names};
+}
+
+Pose Reconfigurator::present_pose(const MeshObstacleSettings& obstacle) {
+  const std::lock_guard lock(mutex_);
+  const double now = scene_time_s();
+  if (obstacle.scheduled && now >= obstacle.scheduled->start_s)
+    return obstacle.scheduled->motion.pose_at(obstacle.scheduled->X_WO, now);
+  return obstacle.motion.pose_at(obstacle.X_WM, now);
 }
 
 Reconfigurator::SceneView Reconfigurator::scene_view() {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "collision/meshes/mesh_loader.hpp"
+#include "config/rendering_values.hpp"
 #include "config/toml_file.hpp"
 #include "core/contact_backend.hpp"
 #include "daemon/run_config.hpp"
@@ -64,8 +65,9 @@ class Reconfigurator {
   /// The motion starts kMoveDelay_s from now and takes duration_s.
   void move_obstacle(const std::string& name, const Pose& X_WO, double duration_s);
 
-  /// Applies keys of [rendering] and [wrench]. source: file name for error messages.
-  void set_rendering(const TomlNode& changes, const std::filesystem::path& source);
+  /// Applies keys of [rendering] and [wrench]. source: file name for error messages. Returns what has
+  /// changed.
+  std::vector<ChangedValue> set_rendering(const TomlNode& changes, const std::filesystem::path& source);
 
   // --- Workspace ---
 
@@ -121,6 +123,9 @@ class Reconfigurator {
     ViewSettings viewpoint;       ///< camera of the scene
   };
   SceneView scene_view();
+
+  /// Returns the pose of the mesh frame of an obstacle in the world now. obstacle: of the present scene.
+  Pose present_pose(const MeshObstacleSettings& obstacle);
 
   /// Names of the obstacles, indexed by obstacle number.
   struct ObstacleNames {

@@ -103,7 +103,41 @@ class GeometryCache {
   std::uint64_t geometry_id_ = 0;
 };
 
-Json scene_json(const Reconfigurator& reconfigurator) {
+Json json_of(const RenderingValue::Value& value) {
+  if (const auto* number = std::get_if<double>(&value)) return *number;
+  if (const auto* word = std::get_if<std::string>(&value)) return *word;
+  Json rows = Json::array();
+  for (const auto& row : std::get<Matrix6d>(value).rowwise())
+    rows.push_back(std::vector<double>(row.begin(), row.end()));
+  return rows;
+}
+
+Json rendering_json(const Reconfigurator& reconfigurator) {
+  const Settings settings = reconfigurator.settings();
+  Json values = Json::array();
+  for (const RenderingValue& value : rendering_values()) {
+    Json row = {{"name", value.name},
+                {"value", json_of(value.read(settings))},
+                {"unit", value.unit()},
+                {"expected", expected_text(value)}};
+    if (const std::vector<std::string> words = accepted_words(value); !words.empty()) row["words"] = words;
+    if (const std::string reason = value.unused_reason(settings); !reason.empty()) row["unused"] = reason;
+    values.push_back(std::move(row));
+  }
+  return {{"settings", values}, {"rendering_id", reconfigurator.current_rendering().id}};
+}
+
+Json changed_json(const std::vector<ChangedValue>& changed) {
+  Json values = Json::array();
+  for (const ChangedValue& one : changed)
+    values.push_back({{"name", one.value->name},
+                      {"unit", one.value->unit()},
+                      {"before", json_of(one.before)},
+                      {"now", json_of(one.now)}});
+  return values;
+}
+
+Json scene_json(Reconfigurator& reconfigurator) {
   const auto present = reconfigurator.present_scene();
   const SceneSettings& scene = present->settings;
   const auto kind = [](BodyKind one) { return one == BodyKind::solid ? "solid" : "surface"; };
@@ -112,14 +146,16 @@ Json scene_json(const Reconfigurator& reconfigurator) {
     obstacles.push_back(
         {{"name", obstacle.name},
          {"half_space", {{"normal", json_of(obstacle.normal_W)}, {"offset", obstacle.offset_m}}}});
-  for (const MeshObstacleSettings& obstacle : scene.meshes)
+  for (const MeshObstacleSettings& obstacle : scene.meshes) {
+    const Pose X_WM = reconfigurator.present_pose(obstacle);
     obstacles.push_back({{"name", obstacle.name},
                          {"mesh", obstacle.mesh.string()},
                          {"kind", kind(obstacle.kind)},
                          {"scale", obstacle.scale},
-                         {"position_m", json_of(obstacle.X_WM.translation_m)},
-                         {"rotation_vector_rad", json_of(rotation_vector(obstacle.X_WM.rotation))},
+                         {"position_m", json_of(X_WM.translation_m)},
+                         {"rotation_vector_rad", json_of(rotation_vector(X_WM.rotation))},
                          {"moves", obstacle.motion.moves() || obstacle.scheduled.has_value()}});
+  }
   return {{"file", scene.file.string()},
           {"tool",
            {{"mesh", scene.tool.mesh.string()},
@@ -247,7 +283,7 @@ void add_scene_queries(MethodTable& table, Reconfigurator& reconfigurator) {
       "scene.get",
       Role::observer,
       {},
-      "Returns the tool and the obstacles, each with its name.",
+      "Returns the tool and the obstacles, each with its name and its present pose.",
       [&reconfigurator](const Json&, const Caller&) { return MethodResult(scene_json(reconfigurator)); },
       true});
   table.add(MethodRow{
@@ -327,21 +363,41 @@ void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
 
 void add_rendering_methods(MethodTable& table, Reconfigurator& reconfigurator) {
   table.add(MethodRow{
+      "rendering.get",
+      Role::observer,
+      {},
+      "Returns the values that rendering.set changes, each with its unit and what it accepts; 'unused' "
+      "states "
+      "why the present law or method does not use a value.",
+      [&reconfigurator](const Json&, const Caller&) { return MethodResult(rendering_json(reconfigurator)); },
+      true});
+  table.add(MethodRow{
       "rendering.set",
       Role::operator_,
       {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, contacts, ..."},
        {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
-      "Changes the contact method and the wrench law. Other keys keep their values.",
+      "Changes the contact method and the wrench law. Other keys keep their values. Returns in 'changed' "
+      "what "
+      "held before and what holds now.",
       [&reconfigurator](const Json& params, const Caller& caller) {
         return with_rpc_errors(caller, "rendering.set", [&] {
-          reconfigurator.set_rendering(toml_of(params), "rendering.set");
-          return MethodResult(current_rendering(reconfigurator));
+          const auto changed = reconfigurator.set_rendering(toml_of(params), "rendering.set");
+          Json result = current_rendering(reconfigurator);
+          result["changed"] = changed_json(changed);
+          return MethodResult(result);
         });
       },
       true});
 }
 
 void add_workspace_methods(MethodTable& table, Reconfigurator& reconfigurator) {
+  table.add(MethodRow{
+      "workspace.get",
+      Role::observer,
+      {},
+      "Returns how the handle moves the tool: scale and clutched.",
+      [&reconfigurator](const Json&, const Caller&) { return MethodResult(workspace_json(reconfigurator)); },
+      true});
   table.add(
       MethodRow{"workspace.set",
                 Role::operator_,

@@ -28,7 +28,7 @@ struct Event {
     bool changed_state = true;  ///< True if the fault led to another state.
   };
   struct StiffnessScaled {
-    double scale;  ///< Share of the configured stiffness that stays passive on this device, below 1.
+    double scale;  ///< Share of the configured stiffness that stays passive on this device, 0 to 1.
   };
   /// The profile states no damping, so no stiffness bound can be computed.
   struct StabilityBoundUnknown {};

@@ -126,20 +126,32 @@ void Renderer::scale_renderings() noexcept {
   undriven_.set_loop(stability_.stiffness_at_handle(), stability_.longest_lag_s());
 }
 
+/// Reports the share of the stiffness that stays passive, if it is another one than the reported one.
+void Renderer::report_scale(TimePoint now) noexcept {
+  const double scale = stability_.scale().spring;
+  if (scale == reported_scale_) return;
+  reported_scale_ = scale;
+  events_.emit(now, Event::StiffnessScaled{scale});
+}
+
 PassivityGuard Renderer::derive_stiffness(const TickTime& t) noexcept {
   const auto [spring, damper, bound_known] = stability_.derive();
   scale_renderings();
   if (!bound_known) events_.emit(t.now, Event::StabilityBoundUnknown{});
+  reported_scale_ = spring;
   if (spring < 1.0 || damper < 1.0) events_.emit(t.now, Event::StiffnessScaled{spring});
   return stability_.make_guard();
 }
 
 ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdict, double sent_share,
                                const TickTime& t) noexcept {
+  const double scale_before = stability_.scale().spring;
   if (verdict.sample_usable && !follow_driven(sample, sent_share, t)) {  // trapped between moving obstacles
     invalidate_proxy(t.now);
     demand_.interrupted = true;
   }
+  // While the workspace scale glides, the share changes each tick; its end value is reported.
+  if (stability_.scale().spring == scale_before) report_scale(t.now);
   return contact();
 }
 

@@ -81,6 +81,7 @@ class Renderer {
   void invalidate_proxy(TimePoint now) noexcept;
   void adopt_rendering(TimePoint now) noexcept;
   void scale_renderings() noexcept;
+  void report_scale(TimePoint now) noexcept;
   ContactState contact() const noexcept;
   std::optional<Pose> held_pose() const noexcept;
 
@@ -103,6 +104,7 @@ class Renderer {
   std::uint32_t recentre_count_ = 0;  ///< Last WorkspaceRequest::recentre_count.
   std::uint32_t buttons_ = 0;         ///< Buttons in the previous tick.
   std::uint32_t change_count_ = 0;    ///< Changes made on request since the start.
+  double reported_scale_ = 1.0;       ///< Share of the stiffness in the last event about it.
   double sample_time_s_ = 0.0;        ///< Device time of the last usable sample.
   bool has_sample_time_ = false;      ///< False until the first usable sample of a device.
   Demand demand_;                     ///< Demand of the last tick with a usable sample.

@@ -177,6 +177,60 @@ TEST_CASE(
   has(a.rejected("scene.add", other), "sEcReT");
 }
 
+TEST_CASE("rendering.get states each value, and rendering.set what has changed", "[scene_methods]") {
+  const Rig a;
+  const auto row = [&](const char* name) {
+    const Json result = a.ask("rendering.get", Json::object(), Role::observer);
+    for (const Json& one : result["settings"])
+      if (one["name"] == name) return one;
+    return Json();
+  };
+  CHECK(row("wrench.law") == Json({{"name", "wrench.law"},
+                                   {"value", "energy"},
+                                   {"unit", ""},
+                                   {"expected", "\"pid\" or \"energy\""},
+                                   {"words", {"pid", "energy"}}}));
+  CHECK(row("wrench.stiffness.linear_N_per_m") == Json({{"name", "wrench.stiffness.linear_N_per_m"},
+                                                        {"value", 600.0},
+                                                        {"unit", "N/m"},
+                                                        {"expected", "a number from 0 to 100000 N/m"},
+                                                        {"unused", "only wrench.law pid uses it"}}));
+  const Json result =
+      a.ask("rendering.set",
+            {{"wrench",
+              {{"law", "pid"}, {"stiffness", {{"linear_N_per_m", 900.0}, {"angular_Nm_per_rad", 1.5}}}}}});
+  CHECK(result["changed"] ==
+        Json::array({{{"name", "wrench.law"}, {"unit", ""}, {"before", "energy"}, {"now", "pid"}},
+                     {{"name", "wrench.stiffness.linear_N_per_m"},
+                      {"unit", "N/m"},
+                      {"before", 600.0},
+                      {"now", 900.0}}}));
+  CHECK(row("wrench.stiffness.linear_N_per_m")["value"] == 900.0);
+  a.rejected("rendering.set", {{"wrench", {{"law", "energy"}, {"integral_limit_N", 1000.0}}}});
+  CHECK(row("wrench.law")["value"] == "pid");
+}
+
+TEST_CASE("scene.get states where a moved obstacle is now", "[scene_methods]") {
+  Rig a;
+  a.ask("scene.add", {{"obstacle", a_block()}});
+  a.s.run(0.5);
+  a.ask("scene.move", {{"name", "block"}, {"position_m", {0.0, 0.3, 0.0}}, {"duration_s", 0.5}});
+  const auto y = [&] { return a.ask("scene.get")["obstacles"][1]["position_m"][1].get<double>(); };
+  CHECK(y() == Approx(0.2));
+  a.s.run(0.45);  // 0.2 s pass before the motion starts
+  CHECK(y() > 0.21);
+  CHECK(y() < 0.29);
+  a.s.run(1.0);
+  CHECK(y() == Approx(0.3));
+}
+
+TEST_CASE("workspace.get returns what workspace.set has set", "[scene_methods]") {
+  const Rig a;
+  a.ask("workspace.set", {{"scale", 2.0}});
+  CHECK(a.ask("workspace.get", Json::object(), Role::observer) ==
+        Json({{"scale", 2.0}, {"clutched", false}}));
+}
+
 TEST_CASE("workspace.set applies all values or none", "[scene_methods]") {
   const Rig a;
   const Json unchanged = a.ask("workspace.set");
