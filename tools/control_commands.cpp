@@ -22,6 +22,7 @@
 #include "config/nearest_key.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/owned_fd.hpp"
+#include "tools/daemon_call.hpp"
 #include "tools/output_file.hpp"
 
 namespace wrenchd {
@@ -32,8 +33,6 @@ using namespace std::chrono_literals;
 /// Heartbeat interval: a third of the heartbeat timeout, so that two heartbeats may be late.
 constexpr auto kHeartbeatInterval = 30ms;
 constexpr auto kFadeTimeout = 2s;
-/// Response timeout, above the duration of the slowest request (a mesh of a million triangles).
-constexpr auto kResponseTimeout = 60s;
 
 std::atomic<bool> interrupted{false};
 
@@ -41,15 +40,6 @@ void catch_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { interrupted.store(true); };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
-}
-
-void print(const std::string& text) {
-  std::fputs(text.c_str(), stdout);
-  std::fflush(stdout);
-}
-
-std::string pretty(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 std::string text_or(const Json& value, const char* fallback) {
@@ -68,10 +58,6 @@ void show(const Json& event, const ControlOptions& options) {
 /// Returns true in states with force, and in states that lead to force.
 bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
-}
-
-Json call(Client& client, const std::string& method, const Json& params = Json::object()) {
-  return Json::parse(client.call(method, params.dump()));
 }
 
 /// Returns the next event; empty if none came in time.

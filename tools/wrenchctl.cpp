@@ -18,18 +18,20 @@ using namespace wrenchd;
 /// All commands in the order of the help.
 std::vector<std::unique_ptr<Subcommand>> make_commands() {
   std::vector<std::unique_ptr<Subcommand>> commands;
-  for (const auto make :
-       {make_solve_command, make_check_command, make_report_commands, make_device_commands,
-        make_doctor_command, make_daemon_commands, make_view_command, make_fault_command, make_mesh_command,
-        make_gallery_command, make_paper_command, make_recording_commands, make_sweep_command})
+  for (const auto make : {make_solve_command, make_check_command, make_report_commands, make_device_commands,
+                          make_doctor_command, make_daemon_commands, make_set_command, make_scene_command,
+                          make_workspace_command, make_view_command, make_fault_command, make_mesh_command,
+                          make_gallery_command, make_paper_command, make_recording_commands,
+                          make_sweep_command, make_names_command})
     commands.push_back(make());
   return commands;
 }
 
+/// Names of the subcommands that the help shows.
 std::string subcommand_names(const CLI::App& app) {
   std::string names;
   for (const CLI::App* command : app.get_subcommands({}))
-    names += (names.empty() ? "" : ", ") + command->get_name();
+    if (!command->get_group().empty()) names += (names.empty() ? "" : ", ") + command->get_name();
   return names;
 }
 
@@ -46,6 +48,8 @@ int main(int argc, char** argv) {
   CLI::App app("wrenchctl: controls wrenchd, checks its input files, and computes projections and wrenches.");
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
   app.footer(
+      "Commands for a running daemon use the socket of --socket; without it, the first of $WRENCHD_SOCKET,\n"
+      "/run/wrenchd/control.sock and $XDG_RUNTIME_DIR/wrenchd/control.sock.\n"
       "Exit codes: 0 done; 1 rejected (standard error names the file, the location and the remedy);\n"
       "2 mesh: not a solid; 3 solve: no admissible pose was found near a pose; 4 replay: a tick differs;\n"
       "5 doctor, conform: a check failed; over 100: invalid command line.");

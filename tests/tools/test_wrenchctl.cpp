@@ -581,8 +581,8 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{},
        "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, conform, profile, "
        "doctor, "
-       "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, "
-       "gallery, "
+       "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, set, scene, workspace, "
+       "view, faults, mesh, gallery, "
        "paper, replay, export, plot, sweep) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
@@ -633,6 +633,93 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
     CHECK(result.exit_code > 100);
     CHECK(result.out == "");
     CHECK(result.err.find(expected) != std::string::npos);
+  }
+}
+
+// Each mistake is one that a person makes: letters left out, doubled or swapped, another case, a beginning
+// only.
+TEST_CASE("a typing mistake of commands, options, words and files has the suggestion that was meant") {
+  const std::string config = test::source_path("config");
+  const TemporaryDirectory dir;
+  dir.write("law.toml", "[wrench]\nlaw = \"enrgy\"\n");
+  dir.write("key.toml", "[wrench]\nstifness = 600\n");
+  dir.write("scene.toml", "scene = \"scenes/cube_on_tabel.toml\"\n");
+  dir.write("profile.toml", "[device]\nprofile = \"polhm\"\n");
+  dir.write("mesh.toml", "[tool]\nmesh = \"bdoy.off\"\n");
+  dir.write("made.toml", "[tool]\nmesh = { make = \"gaer\" }\n");
+  dir.write("body.off", kCube);
+  dir.write("run.h5", "");
+  const auto in_dir = [&](const char* name) { return (dir.path() / name).string(); };
+  struct Mistake {
+    std::vector<std::string> words;  ///< after the name of the program
+    std::string meant;
+    std::string program = "wrenchctl";
+  };
+  const std::vector<Mistake> mistakes = {
+      {{"stauts"}, "'status'"},
+      {{"sttus"}, "'status'"},
+      {{"Status"}, "'status'"},
+      {{"sovle"}, "'solve'"},
+      {{"chek", config + "/wrenchd.toml"}, "'check'"},
+      {{"dcotor"}, "'doctor'"},
+      {{"galery"}, "'gallery'"},
+      {{"fault", "overspeed"}, "'faults'"},
+      {{"aknowledge"}, "'acknowledge'"},
+      {{"recrod", "start"}, "'record'"},
+      {{"udev_rules"}, "'udev-rules'"},
+      {{"work", "scale", "2"}, "'workspace'"},
+      {{"scene", "lits"}, "'list'"},
+      {{"scene", "mvoe", "block"}, "'move'"},
+      {{"workspace", "recenter"}, "'recentre'"},
+      {{"workspace", "scael", "2"}, "'scale'"},
+      {{"mesh", "--make", "gear", "--trangles", "10"}, "'--triangles'"},
+      {{"mesh", "--mak", "gear"}, "'--make'"},
+      {{"mesh", "--make", "gaer"}, "'gear'"},
+      {{"mesh", "--make", "bolder"}, "'boulder'"},
+      {{"status", "--jsn"}, "'--json'"},
+      {{"status", "--sokcet", "/none"}, "'--socket'"},
+      {{"export", "run.h5", "--evry", "10"}, "'--every'"},
+      {{"solve", "s.toml", "--pose", "p.csv"}, "'--poses'"},
+      {{"solve", "s.toml", "--poses", "p.csv", "--law", "enrgy"}, "'energy'"},
+      {{"solve", "s.toml", "--poses", "p.csv", "--method", "exakt"}, "'exact'"},
+      {{"record", "strat"}, "'start'"},
+      {{"scene", "add", "gaer", "--socket", "none"}, "'gear'"},
+      {{"scene", "add", in_dir("boddy.off"), "--socket", "none"}, in_dir("body.off")},
+      {{"faults", "tick_lat"}, "'tick_late'"},
+      {{"faults", "overspeeed"}, "'overspeed'"},
+      {{"gallery", "peg_in_hol"}, "'peg_in_hole'"},
+      {{"gallery", "stair"}, "'staircase'"},
+      {{"check", config + "/wrenchd.tmol"}, config + "/wrenchd.toml"},
+      {{"check", config + "/scene/cube_on_table.toml"}, config + "/scenes/cube_on_table.toml"},
+      {{"check", in_dir("law.toml")}, "'energy'"},
+      {{"check", in_dir("key.toml")}, "'stiffness'"},
+      {{"check", in_dir("scene.toml")}, "cube_on_table.toml'"},
+      {{"check", in_dir("profile.toml")}, "'polhem'"},
+      {{"check", in_dir("mesh.toml")}, in_dir("body.off")},
+      {{"check", in_dir("made.toml")}, "'gear'"},
+      {{"mesh", in_dir("body.of")}, in_dir("body.off")},
+      {{"mesh", in_dir("body.obj")}, in_dir("body.off")},
+      {{"replay", in_dir("rnu.h5")}, in_dir("run.h5")},
+      {{"decode", "polhm", "--hex", "01"}, "'polhem'"},
+      {{"encode", "loopbak", "--wrench", "0,0,1,0,0,0"}, "'loopback'"},
+      {{"--profle", "polhem"}, "'--profile'", "wrenchd"},
+      {{"--virtual-tiem", "--seconds", "1"}, "'--virtual-time'", "wrenchd"},
+      {{"--profile", "polhm"}, "'polhem'", "wrenchd"},
+      {{"--simulate", "spacemouse_splt"}, "'spacemouse_split'", "wrenchd"},
+      {{"--config", config + "/wrnchd.toml"}, config + "/wrenchd.toml", "wrenchd"},
+      {{"--config", "gallery/peg_in_hol.toml"}, "peg_in_hole.toml'", "wrenchd"},
+      {{"--realtime", "of"}, "'off'", "wrenchd"},
+  };
+  for (const auto& [words, meant, program] : mistakes) {
+    const ProgramResult result = run_program(program, words);
+    std::string line = program;
+    for (const std::string& word : words) line += " " + word;
+    INFO(line << "\n" << result.err);
+    CHECK(result.exit_code != 0);
+    CHECK(result.out == "");
+    const std::size_t suggestion = result.err.find("did you mean ");
+    REQUIRE(suggestion != std::string::npos);
+    CHECK(result.err.find(meant, suggestion) != std::string::npos);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/option_checks.hpp"
+#include "tools/commands/daemon_command.hpp"
 #include "tools/commands/subcommand.hpp"
 #include "tools/control_commands.hpp"
 
@@ -37,14 +38,7 @@ class DaemonCommands final : public Subcommand {
  private:
   template <class Run>
   CLI::App* add(CLI::App& app, const char* name, const char* description, Run run) {
-    CLI::App* command = app.add_subcommand(name, description);
-    command->group(kDaemonGroup);
-    command
-        ->add_option("--socket", options_.socket,
-                     "the daemon's control socket; without it, the first of $WRENCHD_SOCKET,\n"
-                     "/run/wrenchd/control.sock and $XDG_RUNTIME_DIR/wrenchd/control.sock")
-        ->check(not_empty());
-    command->add_flag("--json", options_.json, "print the daemon's response unchanged");
+    CLI::App* command = add_daemon_command(app, name, description, options_);
     command->callback([run] { run(); });
     return command;
   }

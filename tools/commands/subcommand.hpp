@@ -52,6 +52,9 @@ std::unique_ptr<Subcommand> make_report_commands();  ///< decode, encode
 std::unique_ptr<Subcommand> make_device_commands();  ///< devices, udev-rules, calibrate, conform, profile
 std::unique_ptr<Subcommand> make_doctor_command();
 std::unique_ptr<Subcommand> make_daemon_commands();  ///< status, watch, arm, record and others
+std::unique_ptr<Subcommand> make_set_command();
+std::unique_ptr<Subcommand> make_scene_command();
+std::unique_ptr<Subcommand> make_workspace_command();
 std::unique_ptr<Subcommand> make_view_command();
 std::unique_ptr<Subcommand> make_fault_command();
 std::unique_ptr<Subcommand> make_mesh_command();
@@ -59,6 +62,7 @@ std::unique_ptr<Subcommand> make_gallery_command();
 std::unique_ptr<Subcommand> make_paper_command();
 std::unique_ptr<Subcommand> make_recording_commands();  ///< replay, export, plot
 std::unique_ptr<Subcommand> make_sweep_command();
+std::unique_ptr<Subcommand> make_names_command();  ///< for the shell completion; the help does not show it
 
 /// Prints a line about progress or a change to standard error, after the program's name.
 void print_note(const std::string& text);
