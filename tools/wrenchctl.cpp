@@ -17,10 +17,10 @@ using namespace wrenchd;
 /// All commands in the order of the help.
 std::vector<std::unique_ptr<Subcommand>> make_commands() {
   std::vector<std::unique_ptr<Subcommand>> commands;
-  for (const auto make :
-       {make_solve_command, make_check_command, make_report_commands, make_device_commands,
-        make_doctor_command, make_daemon_commands, make_view_command, make_fault_command, make_mesh_command,
-        make_gallery_command, make_paper_command, make_recording_commands, make_sweep_command})
+  for (const auto make : {make_solve_command, make_check_command, make_report_commands, make_device_commands,
+                          make_doctor_command, make_daemon_commands, make_view_command, make_fault_command,
+                          make_mesh_command, make_import_command, make_gallery_command, make_paper_command,
+                          make_recording_commands, make_sweep_command})
     commands.push_back(make());
   return commands;
 }

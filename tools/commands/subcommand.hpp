@@ -55,6 +55,7 @@ std::unique_ptr<Subcommand> make_daemon_commands();  ///< status, watch, arm, re
 std::unique_ptr<Subcommand> make_view_command();
 std::unique_ptr<Subcommand> make_fault_command();
 std::unique_ptr<Subcommand> make_mesh_command();
+std::unique_ptr<Subcommand> make_import_command();
 std::unique_ptr<Subcommand> make_gallery_command();
 std::unique_ptr<Subcommand> make_paper_command();
 std::unique_ptr<Subcommand> make_recording_commands();  ///< replay, export, plot

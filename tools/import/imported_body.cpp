@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/import/imported_body.hpp"
+
+#include <cmath>
+
+#include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_union.hpp"
+#include "tools/import/import_error.hpp"
+#include "tools/import/length.hpp"
+
+namespace wrenchd {
+namespace {
+
+PolygonSoup soup_of(const TriangleMesh& mesh) {
+  PolygonSoup soup;
+  soup.vertices = mesh.vertices_m;
+  soup.faces.reserve(mesh.triangles.size());
+  for (const auto& t : mesh.triangles) soup.faces.push_back({t[0], t[1], t[2]});
+  return soup;
+}
+
+std::string defects_text(const MeshReport& report) {
+  std::string text;
+  for (const std::string& defect : report.defects) text += (text.empty() ? "" : "; ") + defect;
+  return text;
+}
+
+/// Repairs and checks a mesh. Returns false and the defects if it is no solid.
+bool make_solid(TriangleMesh& mesh, std::vector<std::string>& remarks, std::string& defects) {
+  PolygonSoup soup = soup_of(mesh);
+  TriangleMesh checked;
+  const MeshReport report = repair_and_check_solid(soup, &checked);
+  if (!report.solid()) {
+    defects = defects_text(report);
+    return false;
+  }
+  remarks.insert(remarks.end(), report.repairs.begin(), report.repairs.end());
+  if (!report.tolerated.empty()) remarks.push_back(report.tolerated);
+  mesh = std::move(checked);
+  return true;
+}
+
+/// Two closed surfaces within chord_mm of each other differ in volume by at most the area times chord_mm, up
+/// to curvature.
+void require_volume(const ImportedPart& part) {
+  double volume_mm3 = 0.0;
+  for (const TriangleMesh& mesh : part.meshes) volume_mm3 += geometric_properties(mesh).volume_mm3;
+  constexpr double kCurvature = 1.5, kRounding = 1e-6;
+  const double allowed_mm3 =
+      kCurvature * part.exact.area_mm2 * part.chord_error_mm + kRounding * std::abs(part.exact.volume_mm3);
+  if (std::abs(volume_mm3 - part.exact.volume_mm3) <= allowed_mm3) return;
+  const Vector3d& at = part.exact.centre_mm;
+  throw ImportError("part '" + part.name + "' near " + place_text(at.x(), at.y(), at.z()) +
+                    ": the volume of its mesh, " + short_number(volume_mm3) +
+                    " mm^3, is not that of its surfaces, " + short_number(part.exact.volume_mm3) +
+                    " mm^3; repair the solid in the CAD program");
+}
+
+void add_surface(const std::vector<TriangleMesh>& meshes, const std::string& defects, ImportedBody& body) {
+  PolygonSoup soup = soup_of(together(meshes));
+  const MeshReport report = repair_and_check_surface(soup, &body.mesh_mm);
+  if (!report.defects.empty()) throw ImportError(defects_text(report));
+  body.surface = true;
+  body.remarks.push_back("is no closed solid (" + defects + "); use it with kind = \"surface\"");
+}
+
+/// Takes the meshes together if they are apart, otherwise their union.
+void add_solids(const std::vector<TriangleMesh>& solids, ImportedBody& body) {
+  if (solids.size() == 1) {
+    body.mesh_mm = solids.front();
+    return;
+  }
+  TriangleMesh all = together(solids);
+  double sum_mm3 = 0.0;
+  for (const TriangleMesh& solid : solids) sum_mm3 += geometric_properties(solid).volume_mm3;
+  // The union is needed only where solids touch or one contains another, and it takes long for fine meshes.
+  std::string defects;
+  std::vector<std::string> repairs;
+  TriangleMesh apart = all;
+  if (make_solid(apart, repairs, defects) && repairs.empty()) {
+    body.mesh_mm = std::move(apart);
+    return;
+  }
+  UnitedMesh united = unite(solids);
+  body.mesh_mm = std::move(united.mesh);
+  body.overlap_mm3 = sum_mm3 - geometric_properties(body.mesh_mm).volume_mm3;
+  const std::string count = std::to_string(solids.size()) + " solids ";
+  constexpr double kRounding = 1e-9;
+  if (!united.united)
+    body.remarks.push_back(count +
+                           "touch or overlap, and could not be united; where they overlap, the volume counts "
+                           "twice in the inertia");
+  else if (body.overlap_mm3 > kRounding * sum_mm3)
+    body.remarks.push_back(count + "overlap by " + short_number(body.overlap_mm3) +
+                           " mm^3; the mesh is their union, and at the edges where they meet its distance "
+                           "from the exact union can exceed the chord error");
+  else
+    body.remarks.push_back(count + "touch each other; the mesh is their union");
+}
+
+}  // namespace
+
+ImportedBody join_parts(ImportedFile file, bool allow_surface) {
+  ImportedBody body;
+  body.remarks = std::move(file.remarks);
+  body.has_exact_surface = true;
+  std::vector<TriangleMesh> solids, meshes;
+  std::string first_defect;
+  bool first = true;
+  for (ImportedPart& part : file.parts) {
+    if (part.has_exact_surface) require_volume(part);
+    body.has_exact_surface = body.has_exact_surface && part.has_exact_surface;
+    body.exact = first ? part.exact : part.has_exact_surface ? sum(body.exact, part.exact) : body.exact;
+    first = false;
+    if (part.chord_error_mm >= body.chord_error_mm) {
+      body.chord_error_mm = part.chord_error_mm;
+      body.worst_place = part.worst_place;
+    }
+    for (TriangleMesh& mesh : part.meshes) {
+      std::string defects;
+      TriangleMesh solid = mesh;
+      std::vector<std::string> repairs;
+      if (make_solid(solid, repairs, defects)) {
+        for (const std::string& repair : repairs)
+          body.remarks.push_back("part '" + part.name + "': " + repair);
+        solids.push_back(std::move(solid));
+      } else if (first_defect.empty()) {
+        first_defect = "part '" + part.name + "': " + defects;
+        if (part.has_exact_surface)
+          throw ImportError(first_defect + "; repair the solid in the CAD program, or use a finer --chord");
+      }
+      meshes.push_back(std::move(mesh));
+    }
+  }
+  if (solids.size() == meshes.size()) {
+    add_solids(solids, body);
+    return body;
+  }
+  // Groups of a mesh file may be pieces of one surface.
+  TriangleMesh whole = together(meshes);
+  std::string defects;
+  std::vector<std::string> repairs;
+  if (meshes.size() > 1 && make_solid(whole, repairs, defects)) {
+    body.remarks.insert(body.remarks.end(), repairs.begin(), repairs.end());
+    body.mesh_mm = std::move(whole);
+    return body;
+  }
+  if (meshes.size() == 1) defects = first_defect;
+  if (!allow_surface)
+    throw ImportError(defects +
+                      "; close the mesh in a mesh editor, or accept it as a surface with --surface");
+  add_surface(meshes, defects, body);
+  return body;
+}
+
+}  // namespace wrenchd
