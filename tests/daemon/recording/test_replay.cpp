@@ -231,7 +231,7 @@ TEST_CASE("a replay needs no file but the recording", "[replay]") {
   // obstacle, and the profile inherits from another.
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const auto there = test::source_path("config");
+  const std::filesystem::path there = test::source_path("config");
   const auto copies = directory.path() / "copies";
   std::filesystem::create_directories(copies);
   for (const char* name : {"meshes", "scenes", "hands", "profiles"})
