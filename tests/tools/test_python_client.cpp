@@ -26,8 +26,8 @@ struct Ran {
 /// A Python program of the tree, with the package of the tree, as a client of the daemon at this socket.
 Ran run_python(const std::string& socket, const std::string& program) {
   const std::string command = "WRENCHD_SOCKET=" + socket +
-                              " PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=" + test::source_path("tools/python") +
-                              " timeout 120 python3 -W error " + test::source_path(program) + " 2>&1";
+                              " PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=" + source_path("tools/python") +
+                              " timeout 120 python3 -W error " + source_path(program) + " 2>&1";
   FILE* const pipe = popen(command.c_str(), "r");
   REQUIRE(pipe != nullptr);
   std::string out;
@@ -39,7 +39,7 @@ Ran run_python(const std::string& socket, const std::string& program) {
 }
 
 std::string contents(const std::string& name) {
-  std::ifstream in(test::source_path(name));
+  std::ifstream in(source_path(name));
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
@@ -77,7 +77,7 @@ TEST_CASE("the Python example works as printed", "[python]") {
 TEST_CASE("the clients work with wrenchd itself", "[python][program][wall_time]") {
   const TemporaryDirectory directory;
   const std::string socket = (directory.path() / "control.sock").string();
-  RunningProgram wrenchd("wrenchd", {"--config", test::source_path("config/wrenchd.toml"), "--control",
+  RunningProgram wrenchd("wrenchd", {"--config", source_path("config/wrenchd.toml"), "--control",
                                      socket, "--realtime", "best_effort"});
   REQUIRE(wrenchd.wait_for_output("control socket"));
   for (const std::string program :
