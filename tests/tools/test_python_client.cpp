@@ -77,8 +77,8 @@ TEST_CASE("the Python example works as printed", "[python]") {
 TEST_CASE("the clients work with wrenchd itself", "[python][program][wall_time]") {
   const TemporaryDirectory directory;
   const std::string socket = (directory.path() / "control.sock").string();
-  RunningProgram wrenchd("wrenchd", {"--config", source_path("config/wrenchd.toml"), "--control",
-                                     socket, "--realtime", "best_effort"});
+  RunningProgram wrenchd("wrenchd", {"--config", source_path("config/wrenchd.toml"), "--control", socket,
+                                     "--realtime", "best_effort"});
   REQUIRE(wrenchd.wait_for_output("control socket"));
   for (const std::string program :
        {"tools/python/example.py", "tests/python/consecutive_ticks.py", "tests/python/check_client.py"}) {
