@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "config/toml_file.hpp"
 
@@ -34,12 +35,24 @@ std::string array(const Vector3d& v) {
   return "[" + to_text(v.x()) + ", " + to_text(v.y()) + ", " + to_text(v.z()) + "]";
 }
 
-std::string mesh_line(const std::filesystem::path& mesh, const std::optional<GeneratedMesh>& generated) {
-  if (!generated) {
-    std::error_code error;
-    const std::filesystem::path absolute = std::filesystem::absolute(mesh, error);
-    return "mesh = " + quoted((error ? mesh : absolute.lexically_normal()).string()) + "\n";
-  }
+std::string quoted_file(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::filesystem::path absolute = std::filesystem::absolute(file, error);
+  return quoted((error ? file : absolute.lexically_normal()).string());
+}
+
+std::string parts_line(const std::vector<std::filesystem::path>& parts) {
+  std::string text;
+  for (const std::filesystem::path& part : parts) text += (text.empty() ? "" : ", ") + quoted_file(part);
+  return "meshes = [" + text + "]\n";
+}
+
+/// The shape of the tool or of an obstacle: a file, the files of its parts, or a generated mesh.
+template <class Body>
+std::string mesh_line(const Body& body) {
+  const std::optional<GeneratedMesh>& generated = body.generated;
+  if (!body.parts.empty()) return parts_line(body.parts);
+  if (!generated) return "mesh = " + quoted_file(body.mesh) + "\n";
   std::string text =
       "mesh = { make = " + quoted(generated->kind) + ", triangles = " + std::to_string(generated->triangles);
   if (generated->kind == "bumpy" || generated->kind == "boulder")
@@ -55,9 +68,8 @@ std::string mesh_obstacle(const MeshObstacleSettings& obstacle, double now_s) {
     motion = obstacle.scheduled->motion;
     X_WM = motion.pose_at(obstacle.scheduled->X_WO, now_s);
   }
-  std::string text = "\n[[obstacle]]\nname = " + quoted(obstacle.name) + "\n" +
-                     mesh_line(obstacle.mesh, obstacle.generated) + "scale = " + to_text(obstacle.scale) +
-                     "\nposition_m = " + array(X_WM.translation_m) +
+  std::string text = "\n[[obstacle]]\nname = " + quoted(obstacle.name) + "\n" + mesh_line(obstacle) +
+                     "scale = " + to_text(obstacle.scale) + "\nposition_m = " + array(X_WM.translation_m) +
                      "\nrotation_vector_rad = " + array(rotation_vector(X_WM.rotation)) + "\n";
   if (obstacle.kind == BodyKind::surface) text += "kind = \"surface\"\n";
   if (!motion.moves() || motion.duration_s > 0.0) return text;
@@ -67,14 +79,35 @@ std::string mesh_obstacle(const MeshObstacleSettings& obstacle, double now_s) {
   return text;
 }
 
+/// What gives the inertia, unless it is the default of the kind.
+std::string inertia_lines(const ToolSettings& tool) {
+  const Matrix3d& I = tool.inertia_kg_m2;
+  switch (tool.inertia_source) {
+    case InertiaSource::solid:
+      return {};
+    case InertiaSource::hull:
+      return "inertia = \"hull\"\n";
+    case InertiaSource::shell:
+      return "inertia = \"shell\"\nshell_thickness_m = " + to_text(tool.shell_thickness_m) + "\n";
+    case InertiaSource::given:
+      return "centre_of_mass_m = " + array(tool.centre_of_mass_m) + "\ninertia_kg_m2 = [" + to_text(I(0, 0)) +
+             ", " + to_text(I(1, 1)) + ", " + to_text(I(2, 2)) + ", " + to_text(I(0, 1)) + ", " +
+             to_text(I(0, 2)) + ", " + to_text(I(1, 2)) + "]\n";
+  }
+  return {};
+}
+
+std::string tool_lines(const ToolSettings& tool) {
+  return mesh_line(tool) + "scale = " + to_text(tool.scale) + "\nmass = " + to_text(tool.mass_kg) + "\n" +
+         (tool.kind == BodyKind::surface ? "kind = \"surface\"\n" : "") + inertia_lines(tool);
+}
+
 }  // namespace
 
 std::string scene_text(const SceneSettings& scene, double now_s) {
   std::string text = "# The scene as clients of wrenchd have changed it, at scene time " + to_text(now_s) +
                      " s.\nsurface_tolerance_m = " + to_text(scene.surface_tolerance_m) + "\n\n[tool]\n" +
-                     mesh_line(scene.tool.mesh, scene.tool.generated) +
-                     "scale = " + to_text(scene.tool.scale) + "\nmass = " + to_text(scene.tool.mass_kg) +
-                     "\n";
+                     tool_lines(scene.tool);
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
     text += "\n[[obstacle]]\nname = " + quoted(obstacle.name) +
             "\nhalf_space = { normal = " + array(obstacle.normal_W) +

@@ -61,6 +61,44 @@ TEST_CASE("the text of a scene reads back as the same scene", "[scene_text]") {
         1e-12);  // 1 s after its start
 }
 
+TEST_CASE("the text of a scene keeps kind, inertia and parts of the tool", "[scene_text]") {
+  SceneSettings scene;
+  scene.tool.mesh = kCube;
+  scene.tool.kind = BodyKind::surface;
+  scene.tool.inertia_source = InertiaSource::hull;
+  ToolSettings again = read_back(scene_text(scene, 0.0)).tool;
+  CHECK(again.kind == BodyKind::surface);
+  CHECK(again.inertia_source == InertiaSource::hull);
+
+  scene.tool.inertia_source = InertiaSource::shell;
+  scene.tool.shell_thickness_m = 0.002;
+  again = read_back(scene_text(scene, 0.0)).tool;
+  CHECK(again.inertia_source == InertiaSource::shell);
+  CHECK(again.shell_thickness_m == 0.002);
+
+  scene.tool.inertia_source = InertiaSource::given;
+  scene.tool.centre_of_mass_m = {0.001, -0.002, 0.003};
+  scene.tool.inertia_kg_m2 << 3e-5, 1e-6, 2e-6, 1e-6, 4e-5, 3e-6, 2e-6, 3e-6, 5e-5;
+  again = read_back(scene_text(scene, 0.0)).tool;
+  CHECK(again.inertia_source == InertiaSource::given);
+  CHECK(again.centre_of_mass_m == scene.tool.centre_of_mass_m);
+  CHECK((again.inertia_kg_m2 - scene.tool.inertia_kg_m2).norm() < 1e-20);
+
+  scene.tool = {};
+  scene.tool.mesh = kCube;
+  scene.tool.parts = {kCube, kCube};
+  MeshObstacleSettings pair;
+  pair.name = "pair";
+  pair.mesh = kCube;
+  pair.parts = {kCube, kCube};
+  scene.meshes.push_back(pair);
+  const SceneSettings both = read_back(scene_text(scene, 0.0));
+  CHECK(both.tool.parts.size() == 2);
+  CHECK(both.tool.mesh == scene.tool.mesh);
+  REQUIRE(both.meshes.size() == 1);
+  CHECK(both.meshes[0].parts.size() == 2);
+}
+
 TEST_CASE("a motion that ends is left out of the text of a scene, at the pose of that time", "[scene_text]") {
   SceneSettings scene;
   scene.tool.mesh = kCube;
