@@ -95,7 +95,9 @@ std::string mistake_text(const CLI::App& app, const CLI::Error& error) {
   const bool no_command = !visible_subcommands(innermost(app)).empty();
   const bool word_first = !unexpected.empty() && !is_option(unexpected.front());
   const std::string start = "The following argument was not expected: ";
-  if (word_first && (no_command || (option == unexpected.end() && error.get_name() == "ExtrasError")))
+  const bool only_words =
+      option == unexpected.end() && error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+  if (word_first && (no_command || only_words))
     text = start + unexpected.front() + word_advice(app, unexpected.front());
   else if (option != unexpected.end())
     text = start + *option + option_advice(app, *option);

@@ -176,7 +176,7 @@ void Telemetry::emit_proxy_changes(const ContactState& contact, TimePoint now) n
 /// A wait is reported after a second, because a hand that comes to rest sooner needs no advice. Each
 /// condition that keeps the force away is reported once in a wait, at least a second after the one before.
 void Telemetry::show_wait(State state, const WaitReason& reason, TimePoint now) noexcept {
-  latest_wait_.write(reason);
+  show(reason);
   const bool waited = waiting_;
   waiting_ = state == State::waiting || state == State::self_test;
   if (!waiting_ || !waited) {
@@ -193,10 +193,26 @@ void Telemetry::show_wait(State state, const WaitReason& reason, TimePoint now) 
   events_.emit(now, Event::Waits{state, reason});
 }
 
-WaitReason Telemetry::wait_reason() {
-  const std::lock_guard lock(wait_mutex_);
-  latest_wait_.read(last_wait_);
-  return last_wait_;
+void Telemetry::show(const WaitReason& reason) noexcept {
+  const std::array<double, 6> numbers = {reason.value,           reason.limit,
+                                         reason.to_proxy_W_m[0], reason.to_proxy_W_m[1],
+                                         reason.to_proxy_W_m[2], reason.to_proxy_rad};
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    wait_numbers_[i].store(numbers[i], std::memory_order_relaxed);
+  wait_fault_.store(reason.fault, std::memory_order_relaxed);
+  wait_kind_.store(reason.kind, std::memory_order_relaxed);
+}
+
+WaitReason Telemetry::wait_reason() const noexcept {
+  const auto number = [this](std::size_t i) { return wait_numbers_[i].load(std::memory_order_relaxed); };
+  WaitReason reason;
+  reason.kind = wait_kind_.load(std::memory_order_relaxed);
+  reason.fault = wait_fault_.load(std::memory_order_relaxed);
+  reason.value = number(0);
+  reason.limit = number(1);
+  reason.to_proxy_W_m = {number(2), number(3), number(4)};
+  reason.to_proxy_rad = number(5);
+  return reason;
 }
 
 void Telemetry::count_times(const TickTime& time, const StageTimes& stage_ns, Duration elapsed) noexcept {

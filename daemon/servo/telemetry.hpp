@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <mutex>
 
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
@@ -88,8 +87,8 @@ class Telemetry {
   LimitSettings limits() const noexcept;
   /// The newest record. One thread.
   LatestValue<TickRecord>& latest_record() noexcept { return latest_record_; }
-  /// What the loop waited for in the last tick. Any thread but the servo thread: readers wait for each other.
-  WaitReason wait_reason();
+  /// What the loop waits for. Its numbers may be of two ticks. Any thread.
+  WaitReason wait_reason() const noexcept;
   /// Where the handle was in the last tick with a usable sample. One thread.
   HandlePose handle_pose() noexcept {
     handle_pose_.read(last_handle_pose_);
@@ -101,6 +100,7 @@ class Telemetry {
   void emit_proxy_changes(const ContactState& contact, TimePoint now) noexcept;
   void show_wait(State state, const WaitReason& reason, TimePoint now) noexcept;
   void show(const Rendering& rendering, bool crossfading) noexcept;
+  void show(const WaitReason& reason) noexcept;
 
   EventQueue events_;
   SharedState* shared_state_ = nullptr;
@@ -121,9 +121,9 @@ class Telemetry {
   LoopTiming timing_;
   LoopTotals totals_;
   LatestValue<TickRecord> latest_record_;
-  LatestValue<WaitReason> latest_wait_;
-  std::mutex wait_mutex_;  ///< Of the readers of latest_wait_.
-  WaitReason last_wait_;   ///< Protected by wait_mutex_.
+  std::atomic<WaitReason::Kind> wait_kind_{WaitReason::Kind::none};
+  std::atomic<Fault> wait_fault_{Fault::none};
+  std::array<std::atomic<double>, 6> wait_numbers_{};  ///< Other members of WaitReason in their order.
   LatestValue<HandlePose> handle_pose_;
   HandlePose last_handle_pose_;  ///< Belongs to the reader of handle_pose().
 };

@@ -11,7 +11,8 @@ namespace wrenchd {
 CLI::App* add_daemon_command(CLI::App& app, const std::string& name, const std::string& description,
                              ControlOptions& options) {
   CLI::App* command = app.add_subcommand(name, description);
-  if (app.get_parent() == nullptr) command->group(kDaemonGroup);
+  command->group(app.get_parent() == nullptr ? kDaemonGroup
+                                             : "Subcommands");  // else it inherits the group of its parent
   add_daemon_options(*command, options);
   return command;
 }
