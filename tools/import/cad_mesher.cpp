@@ -269,7 +269,7 @@ MeshedSolid mesh_solid(const TopoDS_Solid& solid, const std::string& part, const
     BRepMesh_IncrementalMesh mesher(solid, parameters);
     const WeldedMesh welded(solid);
     missing_face = welded.missing_face();
-    double factor = 0.5;
+    double next_mm = 0.5 * deflection_mm;
     if (missing_face == 0) {
       const std::size_t triangles = welded.mesh().triangles.size();
       if (triangles > limits.triangles) reject_triangles(part, limits);
@@ -277,7 +277,8 @@ MeshedSolid mesh_solid(const TopoDS_Solid& solid, const std::string& part, const
       worst = welded.measure();
       worst.mm *= kSamplingFactor;
       if (worst.mm <= limits.chord_mm) return {welded.mesh(), worst.mm, worst.face, worst.place_mm};
-      factor = std::clamp(0.8 * limits.chord_mm / worst.mm, 0.05, 0.7);
+      // The angle between segments can keep the error far below the deflection.
+      next_mm = std::min(deflection_mm, worst.mm) * std::clamp(0.8 * limits.chord_mm / worst.mm, 0.05, 0.7);
       // The triangles of curved faces grow at least with the root of the refinement; half of it to be safe.
       const double growth = 0.5 * std::sqrt(worst.mm / limits.chord_mm);
       if (growth * static_cast<double>(welded.curved_triangles()) > static_cast<double>(limits.triangles))
@@ -285,7 +286,7 @@ MeshedSolid mesh_solid(const TopoDS_Solid& solid, const std::string& part, const
       // A finer mesh of a valid face is nearer to it.
       if (pass > 0 && worst.mm > kLeastProgress * previous_mm && ++idle_passes == kMaxIdlePasses) break;
     }
-    deflection_mm *= factor;
+    deflection_mm = next_mm;
   }
   if (missing_face > 0)
     throw ImportError("part '" + part + "', face " + std::to_string(missing_face) +
