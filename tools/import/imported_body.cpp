@@ -152,8 +152,10 @@ ImportedBody join_parts(ImportedFile file, bool allow_surface) {
         solids.push_back(std::move(solid));
       } else if (first_defect.empty()) {
         first_defect = "part '" + part.name + "': " + defects;
-        if (part.has_exact_surface)
-          throw ImportError(first_defect + "; repair the solid in the CAD program, or use a finer --chord");
+        if (part.has_exact_surface && !allow_surface)
+          throw ImportError(first_defect +
+                            "; repair the solid in the CAD program, use a finer --chord, or accept it as a "
+                            "surface with --surface");
       }
       meshes.push_back(std::move(mesh));
     }
