@@ -65,8 +65,6 @@ void require_fitting_options(const ImportOptions& options, SourceKind kind) {
         "--chord belongs to CAD files; the triangles of a mesh file stay as they are: leave it out");
   if (kind != SourceKind::cad && options.skip_surfaces)
     throw ImportError("--skip-surfaces belongs to CAD files; leave it out");
-  if (kind == SourceKind::cad && options.surface)
-    throw ImportError("--surface belongs to mesh files; the solids of a CAD file are closed: leave it out");
   if (kind == SourceKind::urdf && !options.unit.empty())
     throw ImportError("URDF files are in metres; leave --unit out");
   if (kind != SourceKind::urdf && !options.joints.empty())

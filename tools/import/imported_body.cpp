@@ -5,8 +5,10 @@
 
 #include "collision/meshes/mesh_check.hpp"
 #include "collision/meshes/mesh_union.hpp"
+#include "collision/meshes/packer.hpp"
 #include "tools/import/import_error.hpp"
 #include "tools/import/length.hpp"
+#include "tools/import/reading_child.hpp"
 
 namespace wrenchd {
 namespace {
@@ -64,6 +66,30 @@ void add_surface(const std::vector<TriangleMesh>& meshes, const std::string& def
   body.remarks.push_back("is no closed solid (" + defects + "); use it with kind = \"surface\"");
 }
 
+/// Returns the union of solids. CGAL 5.5 can crash on solids that touch in many places, so it runs in a child
+/// process. If it fails, returns all surfaces together. all: all solids as one mesh.
+UnitedMesh unite_in_child(const std::vector<TriangleMesh>& solids, const TriangleMesh& all) {
+  UnitedMesh out;
+  try {
+    const std::string answer = read_in_child("CGAL", {}, [&] {
+      const UnitedMesh united = unite(solids);
+      std::string bytes;
+      const Packer pack(bytes);
+      pack(united.united);
+      pack(united.mesh.vertices_m);
+      pack(united.mesh.triangles);
+      return bytes;
+    });
+    const Unpacker take(answer);
+    take(out.united);
+    take(out.mesh.vertices_m);
+    take(out.mesh.triangles);
+    if (take.at_end()) return out;
+  } catch (const ImportError&) {  // a crash, or a limit
+  }
+  return {all, false};
+}
+
 /// Takes the meshes together if they are apart, otherwise their union.
 void add_solids(const std::vector<TriangleMesh>& solids, ImportedBody& body) {
   if (solids.size() == 1) {
@@ -81,7 +107,7 @@ void add_solids(const std::vector<TriangleMesh>& solids, ImportedBody& body) {
     body.mesh_mm = std::move(apart);
     return;
   }
-  UnitedMesh united = unite(solids);
+  UnitedMesh united = unite_in_child(solids, all);
   body.mesh_mm = std::move(united.mesh);
   body.overlap_mm3 = sum_mm3 - geometric_properties(body.mesh_mm).volume_mm3;
   const std::string count = std::to_string(solids.size()) + " solids ";
@@ -126,8 +152,10 @@ ImportedBody join_parts(ImportedFile file, bool allow_surface) {
         solids.push_back(std::move(solid));
       } else if (first_defect.empty()) {
         first_defect = "part '" + part.name + "': " + defects;
-        if (part.has_exact_surface)
-          throw ImportError(first_defect + "; repair the solid in the CAD program, or use a finer --chord");
+        if (part.has_exact_surface && !allow_surface)
+          throw ImportError(first_defect +
+                            "; repair the solid in the CAD program, use a finer --chord, or accept it as a "
+                            "surface with --surface");
       }
       meshes.push_back(std::move(mesh));
     }

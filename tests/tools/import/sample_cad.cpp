@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include <BRepAlgoAPI_Cut.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepTools.hxx>
@@ -39,7 +40,12 @@ std::string step_of(const TopoDS_Shape& shape, const char* unit) {
   Message::DefaultMessenger()->ChangePrinters().Clear();
   STEPControl_Writer writer;
   Interface_Static::SetCVal("write.step.unit", unit);
-  if (writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone) throw std::runtime_error("no STEP");
+  // The writer states the unit, but writes the numbers of the shape as they are.
+  const std::string name = unit;
+  gp_Trsf to_unit;
+  to_unit.SetScaleFactor(name == "INCH" ? 1.0 / 25.4 : name == "M" ? 1e-3 : 1.0);
+  const TopoDS_Shape scaled = name == "MM" ? shape : BRepBuilderAPI_Transform(shape, to_unit, true).Shape();
+  if (writer.Transfer(scaled, STEPControl_AsIs) != IFSelect_RetDone) throw std::runtime_error("no STEP");
   const TemporaryDirectory dir;
   const auto file = dir.path() / "a.step";
   if (writer.Write(file.c_str()) != IFSelect_RetDone) throw std::runtime_error("no STEP file");

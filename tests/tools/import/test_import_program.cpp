@@ -92,7 +92,7 @@ TEST_CASE("wrenchd-import rejects invalid options with a remedy") {
       {{step, "-o", (dir.path() / "a.step").string()}, "name a .stl, .off, .ply or .obj file"},
       {{step, "-o", (dir.path() / "no/a.stl").string()}, "existing, writable directory"},
       {{step, "--joint", "a=1"}, "--joint belongs to URDF files"},
-      {{step, "--surface"}, "--surface belongs to mesh files"},
+      {{step, "--package", "a=/tmp"}, "--package belongs to URDF files"},
       {{obj, "--unit", "mm", "--chord", "1mm"}, "--chord belongs to CAD files"},
       {{obj, "--unit", "mm", "--skip-surfaces"}, "--skip-surfaces belongs to CAD files"},
   };
