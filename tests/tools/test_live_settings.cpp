@@ -171,7 +171,7 @@ TEST_CASE("wrenchctl set applies all changes, or none", "[live_settings]") {
     CHECK_THAT(result.err, Contains(expected));
   };
   rejects({"law=pid", "integral_limit_N=1000"}, "expected a number from 0 to 100 N, found 1000");
-  rejects({"planes=60", "law=enrgy"}, "found \"enrgy\"; did you mean 'energy'?");
+  rejects({"planes=60", "law=enrgy"}, "found the text \"enrgy\"; did you mean 'energy'?");
   rejects({"planes=60", "stifness=3"}, "did you mean 'stiffness'?");
   rejects({"method=planar", "static=0.5"}, "exact");
   CHECK(daemon.ask({"set"})["settings"] == before);

@@ -21,7 +21,7 @@ TEST_CASE("wrenchctl workspace shows and changes scale and clutch", "[live_works
         "scale 1 -> scale 2\nundo: wrenchctl workspace scale 1\n");
   CHECK(daemon.ctl({"workspace", "clutch", "on"}).out ==
         "clutch off -> clutch on\nundo: wrenchctl workspace clutch off\n");
-  CHECK(daemon.ask({"workspace"}) == Json({{"scale", 2.0}, {"clutched", true}}));
+  CHECK(daemon.ask({"workspace"}) == Json({{"clutched", true}, {"scale", 2.0}}));
   CHECK(daemon.ctl({"workspace", "clutch", "on"}).out == "clutch on -> clutch on\n");
   CHECK(daemon.ctl({"workspace", "recentre"}).exit_code == 0);
 
@@ -32,7 +32,7 @@ TEST_CASE("wrenchctl workspace shows and changes scale and clutch", "[live_works
   CHECK(mistyped.exit_code > 100);
   CHECK_THAT(mistyped.err, Contains("did you mean 'recentre'?"));
   CHECK_THAT(daemon.ctl({"workspace", "clutch", "onn"}).err, Contains("did you mean 'on'?"));
-  CHECK(daemon.ask({"workspace"}) == Json({{"scale", 2.0}, {"clutched", true}}));
+  CHECK(daemon.ask({"workspace"}) == Json({{"clutched", true}, {"scale", 2.0}}));
 }
 
 }  // namespace
