@@ -48,12 +48,14 @@ std::vector<std::string> add_scene(const std::filesystem::path& scene, const std
                                    const std::string& source, OutputSet& outputs) {
   constexpr double kMinTolerance_m = 1e-6, kMaxTolerance_m = 1e-3;
   double chord_mm = 0.0;
+  bool all_exact = true;
   FileNames names;
   std::vector<std::string> files;
   std::string obstacles;
   for (const PlacedBody& placed : bodies) {
     const StatedError error{placed.body.chord_error_mm, 0.0};  // PLY has double precision
     chord_mm = std::max(chord_mm, error.mm);
+    all_exact = all_exact && placed.body.has_exact_surface;
     const std::string file = names.make(scene.stem().string(), placed.name);
     outputs.add(scene.parent_path() / file,
                 mesh_file_text(placed.body.mesh_mm, file, statement_text(placed.body, error, source)));
@@ -64,15 +66,17 @@ std::vector<std::string> add_scene(const std::filesystem::path& scene, const std
                  (placed.body.surface ? "kind = \"surface\"\n" : "");
   }
   const double tolerance_m = std::clamp(1e-3 * chord_mm, kMinTolerance_m, kMaxTolerance_m);
-  outputs.add(scene, "# wrenchd scene, imported from " + printable_name(source) +
-                         ". The obstacles differ from its exact surfaces by at most " + rounded_up(chord_mm) +
-                         " mm\n# (chord error).\n\n"
-                         "# Contacts may use surfaces outside of the meshes by as much as the chord error.\n"
-                         "surface_tolerance_m = " +
-                         to_text(tolerance_m) +
-                         "\n\n# A placeholder: replace it by your tool.\n[tool]\nmesh = { make = \"sphere\", "
-                         "triangles = 2000 }\nscale = 0.5\nmass = 0.2\n" +
-                         obstacles);
+  outputs.add(scene,
+              "# wrenchd scene, imported from " + printable_name(source) +
+                  ".\n# Chord error of the obstacles, their largest distance from the exact surfaces: " +
+                  rounded_up(chord_mm) + " mm.\n" +
+                  (all_exact ? "" : "# The triangles of mesh files are as in the file.\n") +
+                  "\n# Contacts may use surfaces outside of the meshes by as much as the chord error.\n"
+                  "surface_tolerance_m = " +
+                  to_text(tolerance_m) +
+                  "\n\n# A placeholder: replace it by your tool.\n[tool]\nmesh = { make = \"sphere\", "
+                  "triangles = 2000 }\nscale = 0.5\nmass = 0.2\n" +
+                  obstacles);
   return files;
 }
 
