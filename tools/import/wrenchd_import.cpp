@@ -13,7 +13,9 @@
 int main(int argc, char** argv) {
   using namespace wrenchd;
   if (!open_standard_streams()) return 1;  // else a file that is opened gets the number of a closed stream
-  CLI::App app(std::string("wrenchd-import: ") + kImportDescription);
+  CLI::App app(
+      "wrenchd-import: converts CAD files, common meshes and robots to meshes and scenes of wrenchd.\n"
+      "wrenchctl import is the same command.");
   app.set_version_flag("--version", std::string("wrenchd-import ") + kVersion);
   app.footer(
       "Exit codes: 0 done; 1 rejected (standard error names the file, the location and the remedy);\n"
