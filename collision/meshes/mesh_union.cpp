@@ -12,6 +12,7 @@
 #include <CGAL/Polygon_mesh_processing/bbox.h>
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/boost/graph/helpers.h>
 
 #include "collision/meshes/mesh_check.hpp"
 
@@ -56,6 +57,9 @@ bool add_part(SurfaceMesh part, SurfaceMesh& all) {
   } catch (const std::exception&) {  // parts that intersect themselves, or a failed precondition
     return false;
   }
+  // Where parts touch, CGAL 5.5 may report success and return a mesh that is no valid data structure. The next
+  // union would then crash or never end.
+  if (!CGAL::is_valid_polygon_mesh(result) || !CGAL::is_closed(result)) return false;
   all = std::move(result);
   return true;
 }
