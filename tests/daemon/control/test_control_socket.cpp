@@ -665,7 +665,10 @@ TEST_CASE("replies with descriptors that nobody reads are bounded, and the exces
                          std::filesystem::directory_iterator());
   };
   std::vector<RigClient> hoarders;
-  for (int i = 0; i < 20; ++i) hoarders.push_back(rig.connect(TestUser::observer));
+  for (int i = 0; i < 20; ++i) {
+    hoarders.push_back(rig.connect(TestUser::observer));
+    REQUIRE(hoarders.back().error_code("status") == 0);  // its answer shows that the connection is accepted
+  }
   const auto before = open_fds();
   for (int round = 0; round < 40; ++round)
     for (RigClient& one : hoarders) one.send(request("test.open", "{}", "1"));

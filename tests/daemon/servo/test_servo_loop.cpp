@@ -545,7 +545,7 @@ TEST_CASE("the guard does not scale the force of a plunger that presses against 
           "[servo][moving]") {
   RunConfig plan = shipped_config();
   plan.scene = load_scene(test::source_path("config/scenes/cube_over_plunger.toml"));
-  plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
+  plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, Vector3d::Zero()}};
   plan.settings.simulation.hand_repeats = false;
   VirtualRuntime s(plan);
   s.runtime.loop().requests().arm();
