@@ -9,7 +9,10 @@
 #include <cstddef>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
+#include <iterator>
 #include <limits>
+#include <system_error>
 
 #include <fcntl.h>
 #include <linux/audit.h>
@@ -41,6 +44,10 @@ constexpr std::uint64_t kAddressSpace = std::uint64_t{1} << 30;
 /// at rest shrink to a hundredth.
 constexpr std::uint64_t kUnpackedBytes = std::uint64_t{1} << 30;
 constexpr std::uint64_t kUnpackedFactor = 256;
+
+/// A child inherits the locks that other threads hold at the fork, in libhdf5 or in the allocator of a sanitizer,
+/// and nobody releases them: it would wait for ever on a sound file. Another child is started then.
+constexpr int kAttempts = 5;
 
 /// A sanitizer needs terabytes of address space, and opens pipes for its checks.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -215,21 +222,15 @@ Recording assemble(ReceivedRecording received) {
   return recording;
 }
 
-}  // namespace
-
-Recording read_recording(const std::filesystem::path& file) {
-  try {
-    const OpenedFile opened(file);
-    return read_recording(opened, file);
-  } catch (const FileError& error) {
-    throw RecordingError(file.string() + ": " +
-                         (error.problem() == FileProblem::missing
-                              ? "does not exist; name a recording of wrenchd"
-                              : error.what()));
-  }
+/// Returns true if this process has threads beside the calling one.
+bool has_other_threads() {
+  std::error_code ignored;
+  const std::filesystem::directory_iterator threads("/proc/self/task", ignored);
+  return std::distance(begin(threads), end(threads)) > 1;
 }
 
-Recording read_recording(const OpenedFile& opened, const std::filesystem::path& file) {
+/// Reads the recording in a child process. Throws BrokenStream if the child crashes or takes too long.
+ReceivedRecording read_in_child(const OpenedFile& opened, const std::filesystem::path& file) {
   std::array<int, 2> pipe{};
   const std::string no_process = file.string() + ": cannot be read: no process can be started; try again";
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw RecordingError(no_process);
@@ -251,17 +252,38 @@ Recording read_recording(const OpenedFile& opened, const std::filesystem::path& 
   const std::uint64_t most = bytes < std::numeric_limits<std::uint64_t>::max() / (2 * kUnpackedFactor)
                                  ? kUnpackedBytes + kUnpackedFactor * bytes
                                  : std::numeric_limits<std::uint64_t>::max() / 2;
+  return receive_recording(read_end.get(), file, most, keep_waiting);
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& file) {
   try {
-    return assemble(receive_recording(read_end.get(), file, most, keep_waiting));
-  } catch (const BrokenStream&) {
-    throw RecordingError(file.string() + ": is damaged: libhdf5 crashes or loops on it; use a complete copy");
-  } catch (const RecordingError&) {
-    if (is_locked(opened.fd()))
-      throw RecordingError(file.string() +
-                           ": is still being written, or another program has locked it; end the recording "
-                           "with 'wrenchctl record "
-                           "stop', or wait for the other program, and try again");
-    throw;
+    const OpenedFile opened(file);
+    return read_recording(opened, file);
+  } catch (const FileError& error) {
+    throw RecordingError(file.string() + ": " +
+                         (error.problem() == FileProblem::missing
+                              ? "does not exist; name a recording of wrenchd"
+                              : error.what()));
+  }
+}
+
+Recording read_recording(const OpenedFile& opened, const std::filesystem::path& file) {
+  for (int left = has_other_threads() ? kAttempts : 1;; --left) {
+    try {
+      return assemble(read_in_child(opened, file));
+    } catch (const BrokenStream&) {
+      if (left == 1)
+        throw RecordingError(file.string() +
+                             ": is damaged: libhdf5 crashes or loops on it; use a complete copy");
+    } catch (const RecordingError&) {
+      if (is_locked(opened.fd()))
+        throw RecordingError(file.string() +
+                             ": is still being written, or another program has locked it; end the recording "
+                             "with 'wrenchctl record stop', or wait for the other program, and try again");
+      throw;
+    }
   }
 }
 

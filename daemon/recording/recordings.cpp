@@ -75,6 +75,7 @@ Recordings::~Recordings() {
 }
 
 void Recordings::close() noexcept {
+  close_guard_.run([this] { feed_.drain(); });  // a fault of the last ticks still begins its flight
   feed_.set_fault_recorder({});
   for (std::jthread* thread : {&collector_, &writer_})
     if (thread->joinable()) {
