@@ -76,12 +76,12 @@ void require_fitting_options(const ImportOptions& options, SourceKind kind) {
     throw ImportError("--package belongs to URDF files; leave it out");
 }
 
-Joining joining_of(const ImportOptions& options) {
-  return {options.surface, options.unite};
+Joining joining_of(const ImportOptions& options, const ImportJob& job) {
+  return {options.surface, options.unite, job.chord_mm};
 }
 
 RobotJob robot_of(const ImportOptions& options, const ImportJob& job) {
-  return {job, options.joints, options.packages, joining_of(options)};
+  return {job, options.joints, options.packages, joining_of(options, job)};
 }
 
 void print_list(const ImportOptions& options, const ImportJob& job, SourceKind kind) {
@@ -133,7 +133,7 @@ void print_remarks(const ImportedBody& body) {
 void import_to_mesh(const ImportOptions& options, const ImportJob& job) {
   ImportedFile file = import_file(job);
   print_content(file, job.file.filename().string());
-  const ImportedBody body = join_parts(std::move(file), joining_of(options));
+  const ImportedBody body = join_parts(std::move(file), joining_of(options, job));
   if (options.output.empty()) {
     print_remarks(body);
     std::fputs(report_text(body, {body.chord_error_mm, 0.0}).c_str(), stdout);
@@ -178,7 +178,7 @@ void import_to_scene(const ImportOptions& options, const ImportJob& job, SourceK
     ImportedFile file = import_file(job);
     print_content(file, source);
     remarks = file.remarks;
-    bodies = separate_bodies(std::move(file), joining_of(options));
+    bodies = separate_bodies(std::move(file), joining_of(options, job));
   }
   OutputSet outputs;
   std::vector<std::string> files(bodies.size());

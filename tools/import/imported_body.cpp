@@ -16,6 +16,8 @@ namespace wrenchd {
 namespace {
 
 constexpr double kRounding_mm = 1e-6;
+constexpr const char* kSeparateParts =
+    "make each part an obstacle with -o NAME.toml, select parts with --part, ";
 
 PolygonSoup soup_of(const TriangleMesh& mesh) {
   PolygonSoup soup;
@@ -71,7 +73,7 @@ void add_surface(const std::vector<TriangleMesh>& meshes, const std::string& def
 }
 
 /// Returns the union of solids. CGAL 5.5 can crash on solids that touch in many places, so it runs in a child
-/// process. If it fails, returns all surfaces together. all: all solids as one mesh.
+/// process. If it fails, united is false. all: all solids as one mesh.
 UnitedMesh unite_in_child(const std::vector<TriangleMesh>& solids, const TriangleMesh& all) {
   UnitedMesh out;
   try {
@@ -92,6 +94,34 @@ UnitedMesh unite_in_child(const std::vector<TriangleMesh>& solids, const Triangl
   } catch (const ImportError&) {  // a crash, or a limit
   }
   return {all, false};
+}
+
+/// Returns the solid, grown about its centre of mass so that no point moves by more than `by_mm`.
+TriangleMesh grown(const TriangleMesh& solid, double by_mm) {
+  const Vector3d centre = geometric_properties(solid).centre_mm;
+  double radius_mm = by_mm;
+  for (const Vector3d& p : solid.vertices_m) radius_mm = std::max(radius_mm, (p - centre).norm());
+  TriangleMesh out = solid;
+  for (Vector3d& p : out.vertices_m) p += by_mm / radius_mm * (p - centre);
+  return out;
+}
+
+/// Returns the union. If the surfaces touch in a way that CGAL cannot unite, tries again with solids that are
+/// grown by different lengths of at most `growth_mm`. is_grown: receives whether this was needed.
+UnitedMesh unite_touching(const std::vector<TriangleMesh>& solids, const TriangleMesh& all, double growth_mm,
+                          bool& is_grown) {
+  is_grown = false;
+  UnitedMesh united = unite_in_child(solids, all);
+  if (united.united || growth_mm <= 0.0) return united;
+  std::vector<TriangleMesh> larger;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    const double share = static_cast<double>(i + 1) / static_cast<double>(solids.size());
+    larger.push_back(grown(solids[i], share * growth_mm));
+  }
+  UnitedMesh again = unite_in_child(larger, all);
+  if (!again.united) return united;
+  is_grown = true;
+  return again;
 }
 
 /// The volume that two or more solids have in common.
@@ -129,7 +159,7 @@ Eigen::AlignedBox3d box_of(const TriangleMesh& mesh) {
 
 /// Throws ImportError that names the first two solids that overlap by more than `allowed_mm`.
 void require_no_overlap(const std::vector<TriangleMesh>& solids, const std::vector<std::string>& names,
-                        double allowed_mm) {
+                        double allowed_mm, double growth_mm) {
   constexpr int kMaxPairs = 500;  // a search through more of them could take hours
   std::vector<Eigen::AlignedBox3d> boxes;
   for (const TriangleMesh& solid : solids) boxes.push_back(box_of(solid));
@@ -139,27 +169,28 @@ void require_no_overlap(const std::vector<TriangleMesh>& solids, const std::vect
       if (!boxes[i].intersects(boxes[j])) continue;
       ++pairs;
       const std::vector<TriangleMesh> both = {solids[j], solids[i]};
-      const UnitedMesh united = unite_in_child(both, {});
+      bool is_grown = false;
+      const UnitedMesh united = unite_touching(both, {}, growth_mm, is_grown);
       const Overlap overlap = united.united ? overlap_of(both, united.mesh) : Overlap{};
       if (united.united && overlap.thickness_mm <= allowed_mm) continue;
       const Eigen::AlignedBox3d common = boxes[i].intersection(boxes[j]);
       const Vector3d at = united.united ? overlap.centre_mm : Vector3d(common.center());
       const bool one_part = names[i] == names[j];
-      throw ImportError(
-          (one_part ? "two solids of part '" + names[i] + "'"
-                    : "parts '" + names[j] + "' and '" + names[i] + "'") +
-          (united.united ? " overlap by " + short_number(overlap.volume_mm3) + " mm^3"
-                         : " touch or overlap, and their union cannot be computed,") +
-          " near " + place_text(at.x(), at.y(), at.z()) + "; correct this in the CAD program, " +
-          (one_part ? "" : "make each part an obstacle with -o NAME.toml, select parts with --part, ") +
-          "or accept the union with --unite");
+      throw ImportError((one_part ? "two solids of part '" + names[i] + "'"
+                                  : "parts '" + names[j] + "' and '" + names[i] + "'") +
+                        (united.united ? " overlap by " + short_number(overlap.volume_mm3) + " mm^3"
+                                       : " touch or overlap, and their union cannot be computed,") +
+                        " near " + place_text(at.x(), at.y(), at.z()) +
+                        "; correct this in the CAD program, " + (one_part ? "" : kSeparateParts) +
+                        (united.united ? "or accept the union with --unite"
+                                       : "or accept all faces as a surface with --surface"));
     }
 }
 
 /// Takes the meshes together if they are apart, otherwise their union. Throws ImportError if the solids have
-/// exact surfaces and overlap, unless unite_overlaps is true.
+/// exact surfaces and overlap, unless joining.unite is true.
 void add_solids(const std::vector<TriangleMesh>& solids, const std::vector<std::string>& names,
-                bool unite_overlaps, ImportedBody& body) {
+                const Joining& joining, ImportedBody& body) {
   if (solids.size() == 1) {
     body.mesh_mm = solids.front();
     return;
@@ -173,21 +204,31 @@ void add_solids(const std::vector<TriangleMesh>& solids, const std::vector<std::
     body.mesh_mm = std::move(apart);
     return;
   }
-  UnitedMesh united = unite_in_child(solids, all);
+  // The growth may use what the chord error leaves.
+  constexpr double kGrowth = 0.05;
+  const double growth_mm = body.has_exact_surface ? std::clamp(joining.chord_mm - body.chord_error_mm, 0.0,
+                                                               kGrowth * joining.chord_mm)
+                                                  : 0.0;
+  bool is_grown = false;
+  UnitedMesh united = unite_touching(solids, all, growth_mm, is_grown);
   body.mesh_mm = std::move(united.mesh);
   const Overlap overlap = overlap_of(solids, body.mesh_mm);
   // Round faces that touch have different segments, which overlap by the chord errors of both.
-  const double allowed_mm = 2.0 * body.chord_error_mm + kRounding_mm;
+  const double allowed_mm = 2.0 * (body.chord_error_mm + growth_mm) + kRounding_mm;
   const bool overlaps = overlap.thickness_mm > (body.has_exact_surface ? allowed_mm : 0.0);
-  if (body.has_exact_surface && !unite_overlaps && (!united.united || overlap.volume_mm3 > 0.0))
-    require_no_overlap(solids, names, allowed_mm);
+  if (body.has_exact_surface && !joining.unite && !(joining.surface && !united.united) &&
+      (!united.united || overlap.volume_mm3 > 0.0))
+    require_no_overlap(solids, names, allowed_mm, growth_mm);
+  if (is_grown) body.chord_error_mm += growth_mm;
   body.overlap_mm3 = overlap.volume_mm3;
   const std::string count = std::to_string(solids.size()) + " solids ";
-  if (!united.united)
-    body.remarks.push_back(count +
-                           "touch or overlap, and could not be united; where they overlap, the volume counts "
-                           "twice in the inertia");
-  else if (overlaps)
+  if (!united.united) {
+    const std::string defect = count + "touch or overlap, and their union cannot be computed";
+    if (!joining.surface)
+      throw ImportError(defect + "; " + kSeparateParts + "or accept all faces as a surface with --surface");
+    return add_surface(solids, defect, body);
+  }
+  if (overlaps)
     body.remarks.push_back(count + "overlap by " + short_number(body.overlap_mm3) +
                            " mm^3; the mesh is their union, and at the edges where they meet its distance "
                            "from the exact union can exceed the chord error");
@@ -236,7 +277,7 @@ ImportedBody join_parts(ImportedFile file, const Joining& joining) {
     }
   }
   if (solids.size() == meshes.size()) {
-    add_solids(solids, names, joining.unite, body);
+    add_solids(solids, names, joining, body);
     return body;
   }
   // Groups of a mesh file may be pieces of one surface.

@@ -25,6 +25,9 @@ struct ImportedBody {
 struct Joining {
   bool surface = false;  ///< a mesh that is no solid becomes a surface
   bool unite = false;    ///< solids of a CAD file that overlap become their union
+  /// Largest chord error of a body of a CAD file. Solids that touch are grown by at most what their chord
+  /// error leaves of it, if their surfaces cannot be united otherwise. 0: solids are not grown.
+  double chord_mm = 0.0;
 };
 
 /// Joins all solids to one body: their union, if they touch. Solids of a CAD file overlap if the overlap is
