@@ -21,8 +21,8 @@ std::vector<std::unique_ptr<Subcommand>> make_commands() {
   for (const auto make : {make_solve_command, make_check_command, make_report_commands, make_device_commands,
                           make_doctor_command, make_daemon_commands, make_set_command, make_scene_command,
                           make_workspace_command, make_view_command, make_fault_command, make_mesh_command,
-                          make_gallery_command, make_new_command, make_paper_command, make_recording_commands,
-                          make_sweep_command, make_names_command})
+                          make_import_command, make_gallery_command, make_new_command, make_paper_command,
+                          make_recording_commands, make_sweep_command, make_names_command})
     commands.push_back(make());
   return commands;
 }

@@ -5,26 +5,18 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstddef>
-#include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <iterator>
 #include <limits>
 #include <system_error>
 
 #include <fcntl.h>
-#include <linux/audit.h>
-#include <linux/filter.h>
-#include <linux/seccomp.h>
 #include <sys/file.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/syscall.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/files/limited_process.hpp"
 #include "daemon/control/owned_fd.hpp"
 
 namespace wrenchd {
@@ -49,73 +41,12 @@ constexpr std::uint64_t kUnpackedFactor = 256;
 /// and nobody releases them: it would wait for ever on a sound file. Another child is started then.
 constexpr int kAttempts = 5;
 
-/// A sanitizer needs terabytes of address space, and opens pipes for its checks.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
-#else
-constexpr bool kSanitized = false;
-#endif
-
 /// Returns true if another process has locked the file. HDF5 locks each file that it writes.
 bool is_locked(int fd) {
   // An own description of the file: the lock that this test takes ends with it.
   const OwnedFd own(
       ::open(("/proc/self/fd/" + std::to_string(fd)).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   return own && ::flock(own.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-}
-
-void limit(int resource, std::uint64_t most) noexcept {
-  const rlimit both = {most, most};
-  ::setrlimit(static_cast<__rlimit_resource>(resource), &both);
-}
-
-/// Returns the address space of this process [bytes].
-std::uint64_t address_space() noexcept {
-  unsigned long pages = 0;
-  if (std::FILE* const file = std::fopen("/proc/self/statm", "re")) {
-    if (std::fscanf(file, "%lu", &pages) != 1) pages = 0;
-    std::fclose(file);
-  }
-  return std::uint64_t{pages} * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
-
-/// Restricts this process to reading and writing what it has open: it can open no file, start no process and
-/// use no network. All other system calls fail with EPERM. Without seccomp in the kernel the limits remain.
-void restrict_system_calls() noexcept {
-#if defined(__x86_64__)
-  constexpr std::uint32_t kArchitecture = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-  constexpr std::uint32_t kArchitecture = AUDIT_ARCH_AARCH64;
-#else
-  constexpr std::uint32_t kArchitecture = 0;
-#endif
-  constexpr std::array kAllowed = {
-      SYS_read,        SYS_pread64,     SYS_readv,         SYS_lseek,          SYS_fstat,  SYS_newfstatat,
-      SYS_write,       SYS_writev,      SYS_close,         SYS_mmap,           SYS_munmap, SYS_mremap,
-      SYS_mprotect,    SYS_madvise,     SYS_brk,           SYS_futex,          SYS_flock,  SYS_fcntl,
-      SYS_exit,        SYS_exit_group,  SYS_rt_sigreturn,  SYS_rt_sigprocmask, SYS_getpid, SYS_gettid,
-      SYS_tgkill,      SYS_getrandom,   SYS_clock_gettime, SYS_sched_yield,    SYS_getcwd, SYS_rt_sigaction,
-      SYS_sigaltstack, SYS_gettimeofday};
-  if (kArchitecture == 0) return;
-  std::array<sock_filter, kAllowed.size() + 6> program{};
-  std::size_t n = 0;
-  program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch));
-  program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0);
-  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS);
-  program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr));
-  for (std::size_t i = 0; i < kAllowed.size(); ++i)
-    program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(kAllowed[i]),
-                            static_cast<std::uint8_t>(kAllowed.size() - i), 0);
-  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM);
-  program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
-  const sock_fprog filter{static_cast<unsigned short>(n), program.data()};
-  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter);
 }
 
 double allowed_cpu_s(std::uint64_t file_bytes) {
@@ -125,27 +56,17 @@ double allowed_cpu_s(std::uint64_t file_bytes) {
 /// The child process. It keeps no signal handler and no descriptor of the parent, except the file and the
 /// pipe.
 [[noreturn]] void run_child(int file, std::uint64_t file_bytes, int pipe) noexcept {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXCPU, SIGTERM, SIGINT})
-    ::signal(signal, SIG_DFL);
-  constexpr int kFile = 3, kPipe = 4;
-  // The numbers may collide, so both move out of the way first.
-  const int file_copy = ::fcntl(file, F_DUPFD, 10), pipe_copy = ::fcntl(pipe, F_DUPFD, 10);
-  if (file_copy < 0 || pipe_copy < 0 || ::dup2(file_copy, kFile) < 0 || ::dup2(pipe_copy, kPipe) < 0)
-    ::_exit(1);
-  ::syscall(SYS_close_range, kPipe + 1, ~0U, 0);
-  limit(RLIMIT_CORE, 0);
-  limit(RLIMIT_FSIZE, 0);
-  limit(RLIMIT_CPU,
-        static_cast<std::uint64_t>(allowed_cpu_s(file_bytes)) + 2);  // the parent counts more finely
-  if (!kSanitized) limit(RLIMIT_AS, address_space() + kAddressSpace);
-  RecordingSender sender(kPipe);
+  begin_limited_child(
+      file, pipe,
+      static_cast<std::uint64_t>(allowed_cpu_s(file_bytes)) + 2);  // the parent counts more finely
+  if (!kSanitized) limit_resource(RLIMIT_AS, address_space_bytes() + kAddressSpace);
+  RecordingSender sender(kChildPipe);
   try {
     send_hdf5(
-        kFile, file_bytes,
+        kChildFile, file_bytes,
         [] {
           if (kSanitized) return;
-          limit(RLIMIT_NOFILE, 0);  // what is open stays open
+          limit_resource(RLIMIT_NOFILE, 0);  // what is open stays open
           restrict_system_calls();
         },
         sender);
@@ -160,31 +81,6 @@ double allowed_cpu_s(std::uint64_t file_bytes) {
   }
   ::_exit(1);
 }
-
-/// The child process, as the parent sees it. The destructor ends it.
-class Child {
- public:
-  explicit Child(pid_t pid) : pid_(pid) {
-    if (::clock_getcpuclockid(pid, &clock_) != 0) clock_ = CLOCK_MONOTONIC;
-  }
-  ~Child() {
-    ::kill(pid_, SIGKILL);
-    while (::waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
-    }
-  }
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
-
-  double cpu_s() const noexcept {
-    timespec used{};
-    if (clock_ == CLOCK_MONOTONIC || ::clock_gettime(clock_, &used) != 0) return 0.0;
-    return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
-  }
-
- private:
-  pid_t pid_;
-  clockid_t clock_{};
-};
 
 /// Returns true for a row that was allocated but not written when the process died. HDF5 reads it as zeros.
 bool is_unwritten(const TickRow& row) {
@@ -240,7 +136,7 @@ ReceivedRecording read_in_child(const OpenedFile& opened, const std::filesystem:
   const pid_t pid = ::fork();
   if (pid < 0) throw RecordingError(no_process);
   if (pid == 0) run_child(opened.fd(), bytes, write_end.get());
-  const Child child(pid);
+  const LimitedChild child(pid);
   write_end.reset();
   const auto begin = std::chrono::steady_clock::now();
   const double most_cpu_s = allowed_cpu_s(bytes);

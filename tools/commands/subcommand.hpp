@@ -58,6 +58,7 @@ std::unique_ptr<Subcommand> make_workspace_command();
 std::unique_ptr<Subcommand> make_view_command();
 std::unique_ptr<Subcommand> make_fault_command();
 std::unique_ptr<Subcommand> make_mesh_command();
+std::unique_ptr<Subcommand> make_import_command();
 std::unique_ptr<Subcommand> make_gallery_command();
 std::unique_ptr<Subcommand> make_new_command();
 std::unique_ptr<Subcommand> make_paper_command();
