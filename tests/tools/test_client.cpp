@@ -195,6 +195,19 @@ TEST_CASE("a reader detects that the daemon is gone", "[client]") {
   CHECK(tick.integer("released") == 1);
 }
 
+TEST_CASE("a reader that never waits detects that the daemon is gone", "[client]") {
+  auto daemon = std::make_unique<StubDaemon>();
+  Client client(daemon->socket());
+  StateReader state = client.open_state();
+  TickState tick;
+  REQUIRE(state.next(tick));
+  daemon.reset();
+  CHECK(code_of([&] {
+          for (const auto end = std::chrono::steady_clock::now() + 10s; std::chrono::steady_clock::now() < end;)
+            state.next(tick, 0s);
+        }) == ClientError::kDisconnected);
+}
+
 TEST_CASE("without a daemon the error names the searched sockets and the remedy", "[client]") {
   CHECK(code_of([] { Client("/nowhere/control.sock"); }) == ClientError::kNoDaemon);
   CHECK_THROWS_WITH(Client("/nowhere/control.sock"),

@@ -277,7 +277,8 @@ StateReader::StateReader(StateReader&& other) noexcept
       memory_(std::exchange(other.memory_, nullptr)),
       bytes_(other.bytes_),
       next_(other.next_),
-      missed_(other.missed_) {}
+      missed_(other.missed_),
+      next_check_(other.next_check_) {}
 
 StateReader& StateReader::operator=(StateReader&& other) noexcept {
   if (this == &other) return *this;
@@ -289,6 +290,7 @@ StateReader& StateReader::operator=(StateReader&& other) noexcept {
   bytes_ = other.bytes_;
   next_ = other.next_;
   missed_ = other.missed_;
+  next_check_ = other.next_check_;
   return *this;
 }
 
@@ -339,7 +341,6 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + timeout;
   const auto pause = std::chrono::duration<double>(0.25 / layout_->rate_Hz);
-  auto next_check = Clock::now() + kConnectionCheckInterval;
   for (;;) {
     while (unread() > 0) {
       if (copy(next_, out) == CopyResult::complete) {
@@ -349,13 +350,14 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
       skip_overwritten();
     }
     const auto now = Clock::now();
-    if (now >= end) return false;
-    if (now >= next_check) {
-      next_check = now + kConnectionCheckInterval;
+    // Before the end is tested: a caller that never waits detects the loss too.
+    if (now >= next_check_) {
+      next_check_ = now + kConnectionCheckInterval;
       if (is_connected_ && !is_connected_() && unread() == 0)
         throw ClientError(ClientError::kDisconnected,
                           "the daemon is gone; connect again when wrenchd is running");
     }
+    if (now >= end) return false;
     std::this_thread::sleep_for(pause);
   }
 }

@@ -111,6 +111,7 @@ class StateReader {
   std::size_t bytes_ = 0;
   std::uint64_t next_ = 0;
   std::uint64_t missed_ = 0;
+  std::chrono::steady_clock::time_point next_check_{};  ///< next time to ask whether the daemon is connected
 };
 
 }  // namespace wrenchd

@@ -209,6 +209,7 @@ class State:
         self._words = memoryview(self._memory).cast("Q")  # reads a word with one load, not byte by byte
         self._in_order = threading.Lock()
         self._is_connected = is_connected
+        self._next_check = 0.0
         self._next = self._written()
         self.missed = 0  # ticks that the daemon overwrote before next() read them
 
@@ -290,7 +291,6 @@ class State:
 
     def _next_record(self, timeout_s):
         end = time.monotonic() + timeout_s
-        next_check = time.monotonic() + _CONNECTION_CHECK_S
         while True:
             while self._written() > self._next:
                 record = self._copy(self._next)
@@ -302,10 +302,11 @@ class State:
                 self.missed += max(skipped, 0)
                 self._next += max(skipped, 0)
             now = time.monotonic()
-            if now >= end:
-                return None
-            if now >= next_check:
-                next_check = now + _CONNECTION_CHECK_S
+            # Before the end is tested: a caller that never waits detects the loss too.
+            if now >= self._next_check:
+                self._next_check = now + _CONNECTION_CHECK_S
                 if not self._is_connected() and self._written() == self._next:
                     raise Disconnected("the daemon is gone; connect again when wrenchd is running")
+            if now >= end:
+                return None
             time.sleep(0.25 / self._layout.rate_Hz)
