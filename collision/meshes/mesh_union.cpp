@@ -57,8 +57,8 @@ bool add_part(SurfaceMesh part, SurfaceMesh& all) {
   } catch (const std::exception&) {  // parts that intersect themselves, or a failed precondition
     return false;
   }
-  // Where parts touch, CGAL 5.5 may report success and return a mesh that is no valid data structure. The next
-  // union would then crash or never end.
+  // Where parts touch, CGAL 5.5 may report success and return a mesh that is no valid data structure. The
+  // next union would then crash or never end.
   if (!CGAL::is_valid_polygon_mesh(result) || !CGAL::is_closed(result)) return false;
   all = std::move(result);
   return true;

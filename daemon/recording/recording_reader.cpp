@@ -37,8 +37,9 @@ constexpr std::uint64_t kAddressSpace = std::uint64_t{1} << 30;
 constexpr std::uint64_t kUnpackedBytes = std::uint64_t{1} << 30;
 constexpr std::uint64_t kUnpackedFactor = 256;
 
-/// A child inherits the locks that other threads hold at the fork, in libhdf5 or in the allocator of a sanitizer,
-/// and nobody releases them: it would wait for ever on a sound file. Another child is started then.
+/// A child inherits the locks that other threads hold at the fork, in libhdf5 or in the allocator of a
+/// sanitizer, and nobody releases them: it would wait for ever on a sound file. Another child is started
+/// then.
 constexpr int kAttempts = 5;
 
 /// Returns true if another process has locked the file. HDF5 locks each file that it writes.

@@ -203,7 +203,8 @@ TEST_CASE("a reader that never waits detects that the daemon is gone", "[client]
   REQUIRE(state.next(tick));
   daemon.reset();
   CHECK(code_of([&] {
-          for (const auto end = std::chrono::steady_clock::now() + 10s; std::chrono::steady_clock::now() < end;)
+          for (const auto end = std::chrono::steady_clock::now() + 10s;
+               std::chrono::steady_clock::now() < end;)
             state.next(tick, 0s);
         }) == ClientError::kDisconnected);
 }

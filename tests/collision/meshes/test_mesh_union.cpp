@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "collision/meshes/mesh_union.hpp"
-
 #include <array>
 #include <cmath>
 #include <set>
@@ -8,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_union.hpp"
 #include "tests/support/random_values.hpp"
 
 using namespace wrenchd;

@@ -278,7 +278,8 @@ TEST_CASE("recordings contain the ticks up to the end of the loop", "[recording]
   bool flight = false;
   for (const auto& entry : std::filesystem::directory_iterator(files.path()))
     if (entry.path().filename().string().starts_with("flight-"))
-      flight = flight || static_cast<State>(read_recording(entry.path()).ticks.back().state) == State::shutdown;
+      flight =
+          flight || static_cast<State>(read_recording(entry.path()).ticks.back().state) == State::shutdown;
   CHECK(flight);
 }
 
