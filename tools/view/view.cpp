@@ -31,6 +31,10 @@ bool open_in_browser(const std::filesystem::path& file) {
 }
 
 void serve(ViewServer& server, const ViewOptions& options) {
+  const std::string wanted = ":" + std::to_string(options.port) + "/";
+  if (options.port != 0 && server.url().find(wanted) == std::string::npos)
+    std::fprintf(stderr, "wrenchctl: port %u is taken; another one serves the page\n",
+                 unsigned{options.port});
   std::printf("%s\n", server.url().c_str());
   std::fflush(stdout);
   std::optional<AddressFile> address;

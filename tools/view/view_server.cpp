@@ -117,6 +117,7 @@ struct ViewServer::Server {
   asio::signal_set signals{io};
 
   Server(std::uint16_t requested_port, PageFiles page_files);
+  void listen(std::uint16_t wanted_port);
   ~Server() { lease.reset(); }
   void accept();
   void push_frames();
@@ -410,20 +411,28 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
 ViewServer::Server::Server(std::uint16_t requested_port, PageFiles page_files)
     : files(std::move(page_files)) {
   try {
-    const tcp::endpoint here(asio::ip::address_v4::loopback(), requested_port);
-    acceptor.open(here.protocol());
-    acceptor.set_option(tcp::acceptor::reuse_address(true));
-    acceptor.bind(here);
-    acceptor.listen();
+    listen(requested_port);
   } catch (const boost::system::system_error& error) {
-    throw std::runtime_error("127.0.0.1:" + std::to_string(requested_port) + ": cannot listen: " +
-                             error.code().message() + "; name another port with --port, or omit it");
+    // The address that is printed contains the port, so any free one serves.
+    if (error.code() != asio::error::address_in_use || requested_port == 0)
+      throw std::runtime_error("127.0.0.1:" + std::to_string(requested_port) + ": cannot listen: " +
+                               error.code().message() + "; name another port with --port, or omit it");
+    acceptor.close();
+    listen(0);
   }
   port = acceptor.local_endpoint().port();
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) signals.add(signal);
   signals.async_wait([this](beast::error_code error, int) {
     if (!error) io.stop();
   });
+}
+
+void ViewServer::Server::listen(std::uint16_t wanted_port) {
+  const tcp::endpoint here(asio::ip::address_v4::loopback(), wanted_port);
+  acceptor.open(here.protocol());
+  acceptor.set_option(tcp::acceptor::reuse_address(true));
+  acceptor.bind(here);
+  acceptor.listen();
 }
 
 /// Returns true if the other end belongs to the user of this process, or to root. The connection of another

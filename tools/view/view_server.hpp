@@ -32,8 +32,8 @@ using IdentifyConnection =
 /// A page that reads slowly receives fewer frames and delays no other page. Not RT-safe: runs a server.
 class ViewServer {
  public:
-  /// port: 0 selects a free port. The feed must outlive this object. Throws std::runtime_error if the server
-  /// cannot listen.
+  /// port: 0 selects a free port, and so does a port that is taken; url() contains it. The feed must outlive
+  /// this object. Throws std::runtime_error if the server cannot listen.
   ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed,
              IdentifyConnection identify = identify_connection);
   ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& feed,

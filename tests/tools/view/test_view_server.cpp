@@ -80,6 +80,20 @@ TEST_CASE("the live view ends while pages are open", "[view]") {
   end_with_open_pages(std::make_unique<ViewServer>(std::uint16_t{0}, page_files(directory), feed));
 }
 
+std::uint16_t port_of(const ViewServer& server) {
+  const std::string url = server.url();
+  return static_cast<std::uint16_t>(std::stoi(url.substr(url.find(':', 7) + 1)));
+}
+
+TEST_CASE("a second view on the same port takes another one, and ends as the first", "[view]") {
+  const TemporaryDirectory directory;
+  LiveFeed feed((directory.path() / "nobody.sock").string());
+  const ViewServer first(0, page_files(directory), feed);
+  auto second = std::make_unique<ViewServer>(port_of(first), page_files(directory), feed);
+  CHECK(port_of(*second) != port_of(first));
+  end_with_open_pages(std::move(second));
+}
+
 /// Connects to the server. Returns true if it answers a request, false if it closes the connection at once.
 bool is_answered(const std::string& url, const std::string& path) {
   const std::string authority = url.substr(7, url.find('/', 7) - 7);
