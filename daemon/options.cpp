@@ -125,7 +125,7 @@ void add_options(CLI::App& app, Options& options) {
       "disarmed.\n"
       "Exit codes: 0 stopped on request; 1 rejected (file, device, kernel); 3 ended with a fault that no\n"
       "client acknowledged; others: usage. Every exit releases the hand: zero wrench, motors off.\n"
-      "Guides: /usr/share/doc/wrenchd/README.md, or README.md of the source tree.");
+      "Guides: /usr/share/doc/wrenchd, or README.md of the source tree.");
   app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
   add_file_options(app, options);
   add_device_options(app, options);

@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done; 1 rejected (standard error names the file, the location and the remedy);\n"
       "2 mesh: not a solid; 3 solve: no admissible pose was found near a pose; 4 replay: a tick differs;\n"
       "5 doctor, conform: a check failed; over 100: invalid command line.\n"
-      "Guides: /usr/share/doc/wrenchd/README.md, or README.md of the source tree.");
+      "Guides: /usr/share/doc/wrenchd, or README.md of the source tree.");
   app.require_subcommand(0, 1);  // optional, so that an unknown command appears by name in the error
   const auto commands = make_commands();
   for (const auto& command : commands) command->add_to(app);

@@ -481,6 +481,14 @@ TEST_CASE("wrenchctl mesh and check report repairs and an implausible size") {
         std::string::npos);
 }
 
+TEST_CASE("wrenchctl export rejects a kind of file that it does not write, before it reads anything") {
+  const ProgramResult wrong = run_program("wrenchctl", {"export", "missing.h5", "-o", "run.parquet"});
+  CHECK(wrong.exit_code == 1);
+  CHECK(
+      wrong.err.find("run.parquet: wrenchctl writes no files of kind '.parquet'; use .csv, .mat or .mcap") !=
+      std::string::npos);
+}
+
 TEST_CASE("wrenchctl mesh shows several files as one body") {
   const TemporaryDirectory dir;
   const std::string a = dir.write("a.off", as_off(box({0, 0, 0}, {0.08, 0.08, 0.08})));

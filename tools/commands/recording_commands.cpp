@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -62,8 +63,8 @@ class RecordingCommands final : public Subcommand {
     command
         ->add_option(
             "-o,--output", output_,
-            "file to write: .mat for MATLAB and scipy, .mcap for Foxglove, otherwise CSV; without it, CSV\n"
-            "to standard output")
+            "file to write: .csv, .mat for MATLAB and scipy, or .mcap for Foxglove; without it, CSV to\n"
+            "standard output")
         ->check(not_empty());
     command
         ->add_option("--columns", selection_.columns,
@@ -98,10 +99,14 @@ class RecordingCommands final : public Subcommand {
   }
 
   void run_export() const {
-    const Recording recording = read_recording(recording_);
-    if (output_.empty()) return write_csv(std::cout, recording, selection_);
+    if (output_.empty()) return write_csv(std::cout, read_recording(recording_), selection_);
     const std::string kind = std::filesystem::path(output_).extension().string();
+    const bool is_csv = kind.empty() || kind == ".csv" || kind == ".txt";
+    if (!is_csv && kind != ".mat" && kind != ".mcap")
+      throw std::runtime_error(output_ + ": wrenchctl writes no files of kind '" + kind +
+                               "'; use .csv, .mat or .mcap");
     const auto write = kind == ".mat" ? write_mat : kind == ".mcap" ? write_mcap : write_csv;
+    const Recording recording = read_recording(recording_);
     write_output(output_, [&](std::ostream& out) { write(out, recording, selection_); });
   }
 
