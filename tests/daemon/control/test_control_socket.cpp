@@ -419,7 +419,7 @@ TEST_CASE("no misuse of the socket stops the daemon or gains a permission", "[co
     check_unaffected(rig);
   }
   // The daemon has closed all descriptors of these clients.
-  for (int i = 0; i < 200 && open_descriptors() > descriptors; ++i) std::this_thread::sleep_for(10ms);
+  for (int i = 0; i < 1000 && open_descriptors() > descriptors; ++i) std::this_thread::sleep_for(10ms);
   CHECK(open_descriptors() <= descriptors);
 }
 
