@@ -215,8 +215,8 @@ class WeldedMesh {
   }
 
   TopTools_IndexedMapOfShape faces_, edges_, corners_;
-  std::vector<std::uint32_t> first_node_;  ///< of each face
-  std::vector<Vector3d> nodes_;            ///< of all faces
+  std::vector<std::uint32_t> first_node_;  ///< index of the first node of each face in nodes_
+  std::vector<Vector3d> nodes_;            ///< nodes of all faces, face after face [mm]
   std::optional<DisjointSets> sets_;
   std::vector<EdgeNodes> edge_nodes_;
   std::vector<std::optional<std::uint32_t>> corner_node_;

@@ -15,7 +15,7 @@ namespace wrenchd {
 /// Bounds of a tessellation.
 struct MeshingLimits {
   double chord_mm = 0.02;             ///< largest distance of the mesh from the exact surface
-  std::size_t triangles = 2'000'000;  ///< of the whole file
+  std::size_t triangles = 2'000'000;  ///< largest number of triangles of all parts together
 };
 
 /// Returns the meshes and the exact properties of the solids of a model. Each mesh is closed: triangles of

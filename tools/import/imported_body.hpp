@@ -16,7 +16,7 @@ struct ImportedBody {
   bool has_exact_surface = false;
   GeometricProperties exact;    ///< sum of the solids; where they overlap, the volume counts twice
   double overlap_mm3 = 0.0;     ///< volume that counts twice
-  double chord_error_mm = 0.0;  ///< of the mesh as it is in memory
+  double chord_error_mm = 0.0;  ///< chord error of mesh_mm, before a file format rounds its coordinates
   std::string worst_place;
   std::vector<std::string> remarks;
 };

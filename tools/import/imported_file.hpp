@@ -24,9 +24,10 @@ struct ImportedPart {
   /// part of a mesh file has one mesh, which may be open.
   std::vector<TriangleMesh> meshes;
   bool has_exact_surface = false;  ///< from a CAD file: `exact` and `chord_error_mm` are known
-  GeometricProperties exact;       ///< of the exact surfaces, all solids of the part together
-  double chord_error_mm = 0.0;     ///< measured; largest distance between the meshes and the exact surfaces
-  std::string worst_place;         ///< place of the largest chord error
+  GeometricProperties
+      exact;  ///< volume, area and inertia of all solids of the part, from their exact surfaces
+  double chord_error_mm = 0.0;  ///< measured; largest distance between the meshes and the exact surfaces
+  std::string worst_place;      ///< place of the largest chord error
 };
 
 /// Content of an imported file.

@@ -23,7 +23,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr int kMaxNodeDepth = 200;  ///< of nested nodes
+constexpr int kMaxNodeDepth = 200;  ///< deepest nesting of nodes that is accepted
 
 struct FormatInfo {
   const char* name;

@@ -16,7 +16,7 @@ struct UrdfShape {
   std::string name;  ///< unique in the robot: "arm", "arm-2"
   Kind kind = Kind::mesh;
   std::string mesh;                    ///< name of the mesh file as the URDF gives it
-  Vector3d scale = Vector3d::Ones();   ///< of the mesh, along its axes
+  Vector3d scale = Vector3d::Ones();   ///< factors of the mesh along its own axes
   Vector3d size_m = Vector3d::Zero();  ///< box: sides; cylinder: radius, length; sphere: radius
   Pose X_WS;                           ///< W: frame of the root link
 };

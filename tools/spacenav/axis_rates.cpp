@@ -28,7 +28,7 @@ AxisRates axis_rates(const PoseNumbers& X_from, const PoseNumbers& X_to, double 
   const Eigen::AngleAxisd turn(rotation(X_to) * rotation(X_from).conjugate());
   const double angle_rad = std::remainder(turn.angle(), 2.0 * M_PI);
   const Eigen::Vector3d w_rad_per_s = angle_rad / dt_s * turn.axis();
-  // Written so that a number that is not finite fails.
+  // A comparison with NaN is false, so a pose that is not finite is rejected too.
   if (!(v_m_per_s.norm() <= kMaxHandSpeed_m_per_s && w_rad_per_s.norm() <= kMaxHandSpeed_rad_per_s))
     return {};
   const double counts_per_m_per_s = kFullDeflection / full.speed_m_per_s;

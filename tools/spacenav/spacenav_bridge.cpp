@@ -13,14 +13,16 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kRetry = 1s;
-/// A pause in the state that ends the motion.
+/// If the daemon sends no tick for this time, programs receive a motion of zero.
 constexpr auto kSilence = 100ms;
-/// A pause in the state after which its motion is not continued.
+/// The difference of two poses that are farther apart in time is not sent as motion.
 constexpr double kLongestStep_s = 0.5;
 
 std::string device_name(const std::string& status) {
   const auto json = nlohmann::json::parse(status, nullptr, false);
-  return "wrenchd: " + json.value(nlohmann::json::json_pointer("/device/profile"), std::string("no device"));
+  const nlohmann::json::json_pointer profile("/device/profile");
+  const bool has_profile = json.is_object() && json.contains(profile) && json[profile].is_string();
+  return "wrenchd: " + (has_profile ? json[profile].get<std::string>() : std::string("no device"));
 }
 
 }  // namespace

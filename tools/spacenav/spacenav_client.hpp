@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "daemon/control/owned_fd.hpp"
 #include "tools/spacenav/axis_rates.hpp"
@@ -13,7 +14,7 @@ namespace wrenchd {
 
 /// What a program may ask about the device.
 struct SpacenavDevice {
-  std::string name;  ///< "wrenchd: simulated"
+  std::string name;  ///< for example "wrenchd: loopback"
   std::string path;  ///< socket of the daemon
   bool connected = false;
 };
@@ -51,9 +52,9 @@ class SpacenavClient {
   float sensitivity_ = 1.0F;
   std::array<std::byte, sizeof(Words)> received_{};
   std::size_t received_bytes_ = 0;
-  AxisRates unsent_{};  ///< counts times seconds that no event has contained yet
-  bool was_sent_ = false;
-  bool moves_ = false;  ///< the last event had a deflection, so the next one may be zero
+  AxisRates unsent_{};     ///< counts times seconds that no event has contained yet
+  bool was_sent_ = false;  ///< the last call of send() sent its message
+  bool moves_ = false;     ///< the last event had a deflection, so the next one may be zero
 };
 
 }  // namespace wrenchd

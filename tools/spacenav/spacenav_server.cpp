@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/spacenav/spacenav_server.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
@@ -39,7 +40,9 @@ void remove_stale_socket(const std::filesystem::path& path, const sockaddr_un& a
     throw path_error(path,
                      "another program serves this socket; end it (systemctl stop spacenavd), or name another "
                      "path with --serve and in the environment variable SPNAV_SOCKET of your programs");
-  if (errno != ECONNREFUSED) throw path_error(path, std::strerror(errno));
+  if (errno != ECONNREFUSED)
+    throw path_error(path, std::string("a socket is there and cannot be tested: ") + std::strerror(errno) +
+                               "; remove it, or name another path with --serve");
   ::unlink(path.c_str());
 }
 
@@ -77,13 +80,13 @@ SpacenavServer::~SpacenavServer() {
     ::unlink(path_.c_str());
 }
 
-void SpacenavServer::serve(const SpacenavDevice& device, std::chrono::milliseconds time, int also) {
+void SpacenavServer::serve(const SpacenavDevice& device, std::chrono::milliseconds time, int end_fd) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + time;
   for (;;) {
-    std::vector<pollfd> watched = {{also, POLLIN, 0}};
+    std::vector<pollfd> watched = {{end_fd, POLLIN, 0}};
     for (const SpacenavClient& client : clients_) watched.push_back({client.fd(), POLLIN, 0});
-    // A queue of connections that find no place is left alone.
+    // With all places taken, the listening socket is not polled: new programs wait in the kernel's queue.
     if (clients_.size() < kMostClients) watched.push_back({socket_.get(), POLLIN, 0});
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
     const int ready =

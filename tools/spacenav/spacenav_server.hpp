@@ -21,8 +21,9 @@ class SpacenavServer {
   SpacenavServer(const SpacenavServer&) = delete;
   SpacenavServer& operator=(const SpacenavServer&) = delete;
 
-  /// Accepts programs and answers their requests until the time is over, or until `also` can be read.
-  void serve(const SpacenavDevice& device, std::chrono::milliseconds time, int also);
+  /// Accepts programs and answers their requests until the time is over, or until the descriptor `end_fd` can
+  /// be read.
+  void serve(const SpacenavDevice& device, std::chrono::milliseconds time, int end_fd);
 
   void send_motion(const AxisRates& rates, double dt_s);
   void send_button(int number, bool pressed);
@@ -36,7 +37,7 @@ class SpacenavServer {
   std::filesystem::path path_;
   OwnedFd socket_;
   dev_t device_ = 0;  ///< device of the socket file: the destructor removes no other file
-  ino_t inode_ = 0;
+  ino_t inode_ = 0;   ///< inode of the socket file
   std::vector<SpacenavClient> clients_;
 };
 

@@ -19,7 +19,7 @@ namespace {
 
 using namespace wrenchd;
 
-/// The path that libspnav tries without SPNAV_SOCKET belongs to root.
+/// Returns the path that libspnav uses: that of SPNAV_SOCKET, or /run/spnav.sock, which only root can create.
 std::string default_path() {
   const char* const named = std::getenv("SPNAV_SOCKET");
   if (named != nullptr && *named != '\0') return named;
@@ -31,7 +31,7 @@ std::string default_path() {
   return std::string(run) + "/spnav.sock";
 }
 
-/// SIGINT and SIGTERM as something that can be polled.
+/// Blocks SIGINT and SIGTERM, and returns a descriptor that can be read when one of them arrives.
 OwnedFd end_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
   app.add_option("--socket", options.daemon_socket,
                  "socket of wrenchd; without it the same as for wrenchctl");
   app.add_option("--pose", options.pose,
-                 "hand: the motion of the hand; tool: of the tool, which obstacles stop")
+                 "hand: programs follow the hand; tool: they follow the tool, which obstacles stop")
       ->transform(CLI::CheckedTransformer(poses))
       ->option_text("hand|tool=hand");
   app.add_option("--full-speed", options.full.speed_m_per_s,
@@ -84,7 +84,8 @@ int main(int argc, char** argv) {
                  "one makes programs faster")
       ->check(CLI::Range(1e-3, 100.0))
       ->capture_default_str();
-  app.add_option("--full-turn", options.full.speed_rad_per_s, "the same for turns [rad/s]")
+  app.add_option("--full-turn", options.full.speed_rad_per_s,
+                 "rotational speed [rad/s] that counts as full deflection")
       ->check(CLI::Range(1e-3, 1000.0))
       ->capture_default_str();
   app.add_option("--period", period_ms, "time between two events of motion [ms]")
