@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/command_line.hpp"
 #include "daemon/standard_streams.hpp"
 #include "daemon/version.hpp"
 #include "tools/import/import_options.hpp"
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
       "over 100: invalid command line.");
   ImportOptions options;
   add_import_options(app, options);
+  advise_on_mistakes(app);
   try {
     app.parse(argc, argv);
     run_import(options);

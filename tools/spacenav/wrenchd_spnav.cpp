@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <map>
 #include <stdexcept>
 #include <string>
 
@@ -11,6 +10,8 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include "daemon/command_line.hpp"
+#include "daemon/option_checks.hpp"
 #include "daemon/standard_streams.hpp"
 #include "daemon/version.hpp"
 #include "tools/spacenav/spacenav_bridge.hpp"
@@ -66,33 +67,35 @@ int main(int argc, char** argv) {
   bool all_users = false;
   SpacenavOptions options;
   int period_ms = 16;
-  const std::map<std::string, SteeringPose> poses = {{"hand", SteeringPose::hand},
-                                                     {"tool", SteeringPose::tool}};
+  std::string pose = "hand";
   app.add_option("--serve", path,
                  "path of the socket for programs; without it $SPNAV_SOCKET, or\n"
                  "/run/spnav.sock for root, which libspnav finds by itself, or\n"
-                 "$XDG_RUNTIME_DIR/spnav.sock");
+                 "$XDG_RUNTIME_DIR/spnav.sock")
+      ->check(not_empty());
   app.add_flag("--all-users", all_users, "programs of all users may connect and see the motion");
-  app.add_option("--socket", options.daemon_socket,
-                 "socket of wrenchd; without it the same as for wrenchctl");
-  app.add_option("--pose", options.pose,
+  app.add_option("--socket", options.daemon_socket, "socket of wrenchd; without it the same as for wrenchctl")
+      ->check(not_empty());
+  app.add_option("--pose", pose,
                  "hand: programs follow the hand; tool: they follow the tool, which obstacles stop")
-      ->transform(CLI::CheckedTransformer(poses))
-      ->option_text("hand|tool=hand");
+      ->check(one_of({"hand", "tool"}))
+      ->capture_default_str();
   app.add_option("--full-speed", options.full.speed_m_per_s,
                  "speed [m/s] that counts as full deflection of a SpaceMouse; a lower\n"
                  "one makes programs faster")
-      ->check(CLI::Range(1e-3, 100.0))
+      ->check(number_in_range(1e-3, 100.0))
       ->capture_default_str();
   app.add_option("--full-turn", options.full.speed_rad_per_s,
                  "rotational speed [rad/s] that counts as full deflection")
-      ->check(CLI::Range(1e-3, 1000.0))
+      ->check(number_in_range(1e-3, 1000.0))
       ->capture_default_str();
   app.add_option("--period", period_ms, "time between two events of motion [ms]")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  advise_on_mistakes(app);
   try {
     app.parse(argc, argv);
+    if (pose == "tool") options.pose = SteeringPose::tool;
     options.period = std::chrono::milliseconds(period_ms);
     serve(path, all_users, options);
     return 0;
