@@ -7,10 +7,8 @@
 
 #include "collision/meshes/mesh_check.hpp"
 #include "collision/meshes/mesh_union.hpp"
-#include "collision/meshes/packer.hpp"
 #include "tools/import/import_error.hpp"
 #include "tools/import/length.hpp"
-#include "tools/import/reading_child.hpp"
 
 namespace wrenchd {
 namespace {
@@ -72,30 +70,6 @@ void add_surface(const std::vector<TriangleMesh>& meshes, const std::string& def
   body.remarks.push_back("is no closed solid (" + defects + "); use it with kind = \"surface\"");
 }
 
-/// Returns the union of solids. CGAL 5.5 can crash on solids that touch in many places, so it runs in a child
-/// process. If it fails, united is false. all: all solids as one mesh.
-UnitedMesh unite_in_child(const std::vector<TriangleMesh>& solids, const TriangleMesh& all) {
-  UnitedMesh out;
-  try {
-    const std::string answer = read_in_child("CGAL", {}, [&] {
-      const UnitedMesh united = unite(solids);
-      std::string bytes;
-      const Packer pack(bytes);
-      pack(united.united);
-      pack(united.mesh.vertices_m);
-      pack(united.mesh.triangles);
-      return bytes;
-    });
-    const Unpacker take(answer);
-    take(out.united);
-    take(out.mesh.vertices_m);
-    take(out.mesh.triangles);
-    if (take.at_end()) return out;
-  } catch (const ImportError&) {  // a crash, or a limit
-  }
-  return {all, false};
-}
-
 /// Returns the solid, grown about its centre of mass so that no point moves by more than `by_mm`.
 TriangleMesh grown(const TriangleMesh& solid, double by_mm) {
   const Vector3d centre = geometric_properties(solid).centre_mm;
@@ -108,17 +82,16 @@ TriangleMesh grown(const TriangleMesh& solid, double by_mm) {
 
 /// Returns the union. If the surfaces touch in a way that CGAL cannot unite, tries again with solids that are
 /// grown by different lengths of at most `growth_mm`. is_grown: receives whether this was needed.
-UnitedMesh unite_touching(const std::vector<TriangleMesh>& solids, const TriangleMesh& all, double growth_mm,
-                          bool& is_grown) {
+UnitedMesh unite_touching(const std::vector<TriangleMesh>& solids, double growth_mm, bool& is_grown) {
   is_grown = false;
-  UnitedMesh united = unite_in_child(solids, all);
+  UnitedMesh united = unite(solids);
   if (united.united || growth_mm <= 0.0) return united;
   std::vector<TriangleMesh> larger;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     const double share = static_cast<double>(i + 1) / static_cast<double>(solids.size());
     larger.push_back(grown(solids[i], share * growth_mm));
   }
-  UnitedMesh again = unite_in_child(larger, all);
+  UnitedMesh again = unite(larger);
   if (!again.united) return united;
   is_grown = true;
   return again;
@@ -170,7 +143,7 @@ void require_no_overlap(const std::vector<TriangleMesh>& solids, const std::vect
       ++pairs;
       const std::vector<TriangleMesh> both = {solids[j], solids[i]};
       bool is_grown = false;
-      const UnitedMesh united = unite_touching(both, {}, growth_mm, is_grown);
+      const UnitedMesh united = unite_touching(both, growth_mm, is_grown);
       const Overlap overlap = united.united ? overlap_of(both, united.mesh) : Overlap{};
       if (united.united && overlap.thickness_mm <= allowed_mm) continue;
       const Eigen::AlignedBox3d common = boxes[i].intersection(boxes[j]);
@@ -210,7 +183,7 @@ void add_solids(const std::vector<TriangleMesh>& solids, const std::vector<std::
                                                                kGrowth * joining.chord_mm)
                                                   : 0.0;
   bool is_grown = false;
-  UnitedMesh united = unite_touching(solids, all, growth_mm, is_grown);
+  UnitedMesh united = unite_touching(solids, growth_mm, is_grown);
   body.mesh_mm = std::move(united.mesh);
   const Overlap overlap = overlap_of(solids, body.mesh_mm);
   // Round faces that touch have different segments, which overlap by the chord errors of both.
