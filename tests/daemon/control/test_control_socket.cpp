@@ -516,9 +516,11 @@ TEST_CASE("a client with the lease arms, stays armed by heartbeats, and releases
     CHECK(event["sequence"] == next++);  // no event is missing
     if (event["name"] == "state") states.push_back(event["state"]);
   }
+  CHECK(std::ranges::count(states, "waiting") >= 1);
+  // A late tick on a busy machine may add `degraded` before these four.
   REQUIRE(states.size() >= 5);
-  states.erase(states.begin(), states.end() - 5);
-  CHECK(states == std::vector<std::string>{"waiting", "ramping", "active", "releasing", "disarmed"});
+  states.erase(states.begin(), states.end() - 4);
+  CHECK(states == std::vector<std::string>{"ramping", "active", "releasing", "disarmed"});
 }
 
 TEST_CASE("an administrator preempts the lease, and the previous holder gets an event", "[control_socket]") {
