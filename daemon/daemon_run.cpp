@@ -15,6 +15,7 @@
 #include "daemon/clear_start.hpp"
 #include "daemon/control/control_interface.hpp"
 #include "daemon/control/event_feed.hpp"
+#include "daemon/control/hand_methods.hpp"
 #include "daemon/control/record_methods.hpp"
 #include "daemon/control/scene_methods.hpp"
 #include "daemon/control/state_methods.hpp"
@@ -51,9 +52,10 @@ ReloadResult reload_all(Runtime& runtime, EventFeed& feed, const RunContext& con
 }
 
 /// Opens the control socket. Returns null if the configuration asks for none, in virtual time, and if another
-/// daemon uses the default path. Throws std::runtime_error if an explicitly named path cannot be used.
+/// daemon uses the default path. Throws std::runtime_error if an explicitly named path cannot be used. hand:
+/// the simulated device in this process; null if there is none.
 std::unique_ptr<ControlInterface> open_control(Runtime& runtime, EventFeed& feed, Recordings& recordings,
-                                               const RunContext& context) {
+                                               DeviceInHand* hand, const RunContext& context) {
   const SocketPath socket = choose_socket_path(context.options.control, runtime.config().settings.control);
   if (socket.path.empty() || context.options.virtual_time) return nullptr;
   auto control = std::make_unique<ControlInterface>(runtime, feed);
@@ -62,6 +64,7 @@ std::unique_ptr<ControlInterface> open_control(Runtime& runtime, EventFeed& feed
     add_scene_methods(control->methods(), runtime.reconfigurator(),
                       [&] { return reload_all(runtime, feed, context); });
     add_record_methods(control->methods(), recordings);
+    add_hand_methods(control->methods(), hand, runtime.config());
     control->status_sections()["recording"] = [&recordings] { return recording_json(recordings); };
     control->open(socket.path);
     spdlog::info("control socket: {}", socket.path.string());
@@ -110,8 +113,9 @@ LiveView::Print live_print(const Options& options, OutputQueue& queue) {
 using RunLoop = std::function<Fault(Runtime&, Recordings&, LiveView&)>;
 
 /// Builds the runtime on its link, opens recordings and control socket, and runs the loop by `run_loop`.
-Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link, Clock& clock,
-                  const RunLoop& run_loop) {
+/// hand: the simulated device at the other end of the link, in this process; null if there is none.
+Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link, DeviceInHand* hand,
+                  Clock& clock, const RunLoop& run_loop) {
   const bool virtual_time = context.options.virtual_time;
   Runtime runtime(std::move(config), link, clock,
                   virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background,
@@ -132,7 +136,7 @@ Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link,
     Recordings recordings(runtime, feed, clock,
                           virtual_time ? Recordings::Pace::manual : Recordings::Pace::threads);
     if (!settings.recording.file.empty()) recordings.start_file(settings.recording.file);
-    const auto control = open_control(runtime, feed, recordings, context);
+    const auto control = open_control(runtime, feed, recordings, hand, context);
     const ReloadThread reload_thread(runtime, feed, context);
     const TimePoint start = clock.now();
     fault = run_loop(runtime, recordings, view);
@@ -216,7 +220,7 @@ Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
                                     const LoopbackScript& script) {
   VirtualClock clock;
   const auto link = make_scripted_link(config, script, clock);
-  return run_on_link(std::move(config), context, *link, clock,
+  return run_on_link(std::move(config), context, *link, &link->device(), clock,
                      [&](Runtime& runtime, Recordings& recordings, LiveView& view) {
                        start_clear(runtime, link->device());
                        runtime.open();
@@ -243,7 +247,7 @@ Fault run_simulated_in_wall_time(RunConfig config, const RunContext& context, co
   }
   log_grants(lock_memory(config.settings.servo.realtime));
   return run_on_link(
-      std::move(config), context, *link, clock, [&](Runtime& runtime, Recordings&, LiveView& view) {
+      std::move(config), context, *link, device, clock, [&](Runtime& runtime, Recordings&, LiveView& view) {
         if (device != nullptr) start_clear(runtime, *device);
         runtime.open();
         log_missing_motors(runtime.config().profile);
@@ -274,7 +278,7 @@ Fault run_real(RunConfig config, const RunContext& context) {
   if (config.profile.name.empty() && !choose_profile(config, stop, waiting)) return Fault::none;
   const auto link = make_plugged_link(config);
   log_grants(lock_memory(config.settings.servo.realtime));
-  return run_on_link(std::move(config), context, *link, clock,
+  return run_on_link(std::move(config), context, *link, nullptr, clock,
                      [&](Runtime& runtime, Recordings&, LiveView& view) {
                        return run_with_device(runtime, context, *link, end, clock, view);
                      });

@@ -29,8 +29,8 @@ SimulatedArm::SimulatedArm(const DeviceProfile& profile, const SimulationSetting
       X_EH_(profile.X_EH),
       X_HE_(inverse(profile.X_EH)),
       has_wrist_(profile.kinematics.joints == kMaxJoints),
-      path_(settings),
-      prescribed_motion_(has_prescribed_motion(settings)),
+      hand_(settings),
+      target_(reachable(hand_.target())),
       arm_(std::move(arm)),
       handle_(settings, start_pose(profile.name), seconds(kSubstep)),
       configuration_(*find_configuration(handle_.X_BH())) {
@@ -45,7 +45,7 @@ Pose SimulatedArm::start_pose(const std::string& profile) const {
         "device profile " + profile +
         " cannot be simulated: its home_counts correspond to no pose; check [kinematics]");
   const Pose X_BH_home = X_BD_ * *X_DE_home * X_EH_;
-  const Pose goal = target_at(Duration{0}).X_BG;
+  const Pose& goal = target_.X_BG;
   Pose reached = X_BH_home;
   for (int i = 0; i <= kStartSteps; ++i) {
     const double s = static_cast<double>(i) / kStartSteps;
@@ -65,8 +65,8 @@ void SimulatedArm::inject(const SimulatedFault& fault) {
   faults_.add(fault);
 }
 
-HandTarget SimulatedArm::target_at(Duration since_start) const noexcept {
-  HandTarget target = path_.at(since_start);
+/// Returns the target without the rotation of a handle that the arm cannot rotate.
+HandTarget SimulatedArm::reachable(HandTarget target) const noexcept {
   if (has_wrist_) return target;
   target.X_BG.rotation = X_BD_.rotation * X_EH_.rotation;
   target.V_BG.angular_rad_per_s.setZero();
@@ -127,11 +127,11 @@ void SimulatedArm::advance_to(TimePoint t, ReportSink& host) noexcept {
 void SimulatedArm::substep() noexcept {
   now_ += kSubstep;
   const Pose before = handle_.X_BH();
-  const HandTarget target = target_at(now_ - power_on_);
-  if (prescribed_motion_)
-    handle_.step_prescribed(target, motor_demand());
+  target_ = reachable(hand_.advance(now_, now_ - power_on_, seconds(kSubstep)));
+  if (hand_.prescribed())
+    handle_.step_prescribed(target_, motor_demand());
   else
-    handle_.step(target, motor_demand());
+    handle_.step(target_, motor_demand());
   if (const std::optional<Configuration> next = find_configuration(handle_.X_BH()))
     configuration_ = *next;
   else

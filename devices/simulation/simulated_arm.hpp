@@ -47,7 +47,8 @@ class SimulatedArm final : public DeviceInHand {
 
   const Pose& X_BH() const noexcept override { return handle_.X_BH(); }
   const Wrench& motor_wrench() const noexcept override { return handle_.motor_wrench(); }
-  HandTarget hand_target() const noexcept override { return target_at(now_ - power_on_); }
+  const HandTarget& hand_target() const noexcept override { return target_; }
+  bool set_hand_goal(const HandGoal& goal) noexcept override { return hand_.set_goal(goal); }
 
  private:
   struct Configuration {
@@ -56,7 +57,7 @@ class SimulatedArm final : public DeviceInHand {
   };
 
   Pose start_pose(const std::string& profile) const;
-  HandTarget target_at(Duration since_start) const noexcept;
+  HandTarget reachable(HandTarget target) const noexcept;
   std::optional<Configuration> find_configuration(const Pose& X_BH) const noexcept;
   Wrench motor_demand() const noexcept;
   void set_encoders(const Pose& X_BH) noexcept;
@@ -65,8 +66,8 @@ class SimulatedArm final : public DeviceInHand {
   Kinematics kinematics_;
   Pose X_BD_, X_DB_, X_EH_, X_HE_;
   bool has_wrist_;  ///< true if the arm has a wrist
-  HandPath path_;
-  bool prescribed_motion_;  ///< true if the handle follows the path exactly
+  HandMotion hand_;
+  HandTarget target_;  ///< of the hand, as far as the arm can rotate
   std::unique_ptr<EmulatedArm> arm_;
   SimulatedHandle handle_;
   Configuration configuration_;  ///< configuration at the pose of the handle

@@ -66,16 +66,15 @@ SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationS
       substeps_per_sample_(substeps_per_sample(profile)),
       substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
       substep_(substep_of(profile)),
-      path_(settings),
-      prescribed_motion_(has_prescribed_motion(settings)),
-      handle_(settings, path_.at(Duration{0}).X_BG, seconds(substep_)),
+      hand_(settings),
+      handle_(settings, hand_.target().X_BG, seconds(substep_)),
       firmware_(profile, settings, substep_ * static_cast<std::int64_t>(substeps_per_sample_)) {
   firmware_.initialize_encoders(handle_.X_BH());
 }
 
 bool SimulatedDevice::displace_path(const Vector3d& d_B_m) {
-  path_.displace(d_B_m);
-  handle_.reset_to(path_.at(Duration{0}).X_BG);
+  hand_.displace(d_B_m);
+  handle_.reset_to(hand_.target().X_BG);
   firmware_.initialize_encoders(handle_.X_BH());
   return true;
 }
@@ -103,8 +102,8 @@ void SimulatedDevice::skip_to(TimePoint t) noexcept {
 void SimulatedDevice::substep(ReportSink& host) noexcept {
   now_ += substep_;
   apply_firmware_faults();
-  const HandTarget target = path_.at(now_ - power_on_);
-  if (prescribed_motion_)
+  const HandTarget target = hand_.advance(now_, now_ - power_on_, seconds(substep_));
+  if (hand_.prescribed())
     handle_.step_prescribed(target, motor_demand());
   else
     handle_.step(target, motor_demand());

@@ -9,17 +9,18 @@
 #include "core/simulation_settings.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulation/device_in_hand.hpp"
-#include "devices/simulation/hand_path.hpp"
+#include "devices/simulation/hand_motion.hpp"
 #include "devices/simulation/simulated_firmware.hpp"
 #include "devices/simulation/simulated_handle.hpp"
 
 namespace wrenchd {
 
 /// Simulated reference device: a handle in a hand, motors, encoders and firmware. Its output is a pure
-/// function of profile, settings, faults and the commands with their times. Equal inputs give equal bits,
-/// independent of how calls divide the time. If the profile has [frames], the device reports its own end
-/// frame in its own base frame, and accepts wrenches there. It starts at rest at the first waypoint of the
-/// hand path. If the wrench point of the profile is the world origin, the device base is at the world origin.
+/// function of profile, settings, faults, and the commands and goals of the hand with their times. Equal
+/// inputs give equal bits, independent of how calls divide the time. If the profile has [frames], the device
+/// reports its own end frame in its own base frame, and accepts wrenches there. It starts at rest at the
+/// first waypoint of the hand path. If the wrench point of the profile is the world origin, the device base
+/// is at the world origin.
 class SimulatedDevice final : public DeviceInHand {
  public:
   /// Maximum catch-up of advance_to() in one call.
@@ -41,10 +42,11 @@ class SimulatedDevice final : public DeviceInHand {
   // True state of the handle, for tests; the encoders may report a different one.
   TimePoint now() const noexcept { return now_; }
   const Pose& X_BH() const noexcept override { return handle_.X_BH(); }
+  bool set_hand_goal(const HandGoal& goal) noexcept override { return hand_.set_goal(goal); }
   bool displace_path(const Vector3d& d_B_m) override;
   const Twist& V_BH() const noexcept { return handle_.V_BH(); }
   const Wrench& motor_wrench() const noexcept override { return handle_.motor_wrench(); }
-  HandTarget hand_target() const noexcept override { return path_.at(now_ - power_on_); }
+  const HandTarget& hand_target() const noexcept override { return hand_.target(); }
   const SimulatedHandle& handle() const noexcept { return handle_; }
   const SimulatedFirmware& firmware() const noexcept { return firmware_; }
 
@@ -65,8 +67,7 @@ class SimulatedDevice final : public DeviceInHand {
   std::uint64_t substeps_per_report_;
   Duration substep_;
 
-  HandPath path_;
-  bool prescribed_motion_;  ///< true if the handle follows the path exactly
+  HandMotion hand_;
   SimulatedHandle handle_;
   SimulatedFirmware firmware_;
   Pose last_unstuck_pose_;  ///< last reported pose before a freeze_pose fault

@@ -44,7 +44,7 @@ PuckCoding puck_coding(const DeviceProfile& profile) {
 
 SimulatedPuck::SimulatedPuck(const DeviceProfile& profile, const SimulationSettings& settings)
     : profile_(profile),
-      path_(settings),
+      hand_(settings),
       coding_(puck_coding(profile)),
       linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_deflection_m),
       angular_(*profile.deflection, profile.deflection->angular_gain,
@@ -120,7 +120,7 @@ void SimulatedPuck::integrate_displayed_pose(TimePoint now) noexcept {
 void SimulatedPuck::update_deflection() noexcept {
   integrate_displayed_pose(now_);
   const Deflection& settings = *profile_.deflection;
-  const HandTarget target = hand_target();
+  const HandTarget target = hand_.advance(now_, now_ - power_on_, seconds(kStep));
   const Pose& X_BH = displayed_pose_.X_BH();
   Vector3d linear = target.X_BG.translation_m;
   Vector3d angular = rotation_vector(target.X_BG.rotation);

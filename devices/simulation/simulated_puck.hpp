@@ -59,7 +59,8 @@ class SimulatedPuck final : public DeviceInHand, private ReportSink {
   /// Pose of the handle as observed by the hand. RT-safe.
   const Pose& X_BH() const noexcept override { return displayed_pose_.X_BH(); }
   const Wrench& motor_wrench() const noexcept override { return zero_wrench_; }
-  HandTarget hand_target() const noexcept override { return path_.at(now_ - power_on_); }
+  const HandTarget& hand_target() const noexcept override { return hand_.target(); }
+  bool set_hand_goal(const HandGoal& goal) noexcept override { return hand_.set_goal(goal); }
 
  private:
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
@@ -68,7 +69,7 @@ class SimulatedPuck final : public DeviceInHand, private ReportSink {
   DeflectionPose initial_pose() const noexcept;
 
   DeviceProfile profile_;
-  HandPath path_;
+  HandMotion hand_;
   PuckCoding coding_;
   SteeringCurve linear_, angular_;
   EmulatedSpaceMouse mouse_;

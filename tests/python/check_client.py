@@ -96,6 +96,13 @@ class Commands(unittest.TestCase):
         if tick.contact_list:
             self.assertAlmostEqual(sum(contact.load_fraction for contact in tick.contact_list), 1.0)
 
+    def test_moves_the_hand(self):
+        with self.client.open_state() as state:
+            self.client.move_hand([0.1, 0.0, 0.1], expires_s=30)
+            self.assertTrue(soon(lambda: abs(state.latest().X_BH[0] - 0.1) < 2e-3))
+            self.client.move_hand([0.0, 0.0, 0.065], [0, 0, 0.1], 0.05)
+            self.assertTrue(soon(lambda: abs(state.latest().X_BH[0]) < 0.05))
+
     def test_a_lease_ends_with_its_connection(self):
         dying = wrenchd.Client()
         dying.lease()

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <stdexcept>
 
@@ -227,6 +228,16 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   if (method == "stop") return request(kStop);
   if (method == "acknowledge") return request(kAcknowledge);
   if (method == "reinitialize_proxy") return request(kReinitialize);
+  if (method == "hand.set") {
+    const auto vector_of = [&params](const char* name) {
+      return Vector3d(params[name][0], params[name][1], params[name][2]);
+    };
+    const TimePoint expires =
+        std::chrono::steady_clock::now() + from_seconds(params["expires_s"].get<double>());
+    simulated_.simulated.set_hand_goal(
+        {{rotation_from(vector_of("rotation_vector_rad")), vector_of("position_m")}, expires});
+    return {{"expires_ns", expires.time_since_epoch().count()}};
+  }
   if (method == "state.open") {
     json answer;
     open_state(state_, simulated_.runtime.reconfigurator().obstacle_names(),

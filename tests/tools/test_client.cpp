@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <thread>
@@ -89,6 +90,18 @@ TEST_CASE("a client acquires the lease, arms, and reads the wrench on the hand",
   const int heartbeats = daemon.heartbeats();
   std::this_thread::sleep_for(100ms);
   CHECK(daemon.heartbeats() == heartbeats);
+}
+
+TEST_CASE("a client moves the hand of the simulated device", "[client]") {
+  StubDaemon daemon;
+  Client client(daemon.socket());
+  StateReader state = client.open_state();
+  TickState tick;
+  CHECK(soon([&] {
+    client.move_hand({0.1, 0.0, 0.1});
+    return state.latest(tick) && std::abs(tick.number("X_BH", 0) - 0.1) < 2e-3;
+  }));
+  CHECK(soon([&] { return state.latest(tick) && std::abs(tick.number("X_BH", 0)) < 0.05; }));
 }
 
 TEST_CASE("if a client dies, its lease ends with its connection and the force fades", "[client]") {

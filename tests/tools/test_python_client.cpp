@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include <catch2/catch.hpp>
 #include <sys/wait.h>
@@ -95,16 +97,46 @@ TEST_CASE("the clients work with wrenchd itself", "[python][program][wall_time]"
   CHECK(wrenchd.wait().exit_code == 0);
 }
 
-TEST_CASE("the Python program in the guide is the example", "[python]") {
-  std::istringstream example(contents("tools/python/example.py"));
-  std::string printed;
-  int lines = 0;
-  for (std::string line; std::getline(example, line);) {
-    if (line.starts_with("#")) continue;
-    printed += line + "\n";
-    lines += line.empty() ? 0 : 1;
-  }
-  CHECK(lines <= 10);
+TEST_CASE("a program of 15 lines steers the simulated hand against the table",
+          "[python][program][wall_time]") {
+  const TemporaryDirectory directory;
+  const std::string socket = (directory.path() / "control.sock").string();
+  const auto config = directory.write("config/wrenchd.toml", "[servo]\nself_test_s = 0\n");
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config.string(), "--control", socket, "--realtime", "best_effort"});
+  REQUIRE(wrenchd.wait_for_output("control socket"));
+  const Ran ran = run_python(socket, "tools/python/steer_hand.py");
+  INFO(ran.out << wrenchd.err());
+  REQUIRE_RATE(MachineLoad(), ran.exit_code == 0);
+  std::istringstream lines(ran.out);
+  std::string line, last;
+  int count = 0;
+  for (; std::getline(lines, line); ++count) last = line;
+  CHECK(count == 8);
+  double force_N = 0.0, x_m = 0.0, y_m = 0.0, z_m = 0.0;
+  const std::size_t numbers = last.find("at ("), force = last.find("force (");
+  REQUIRE_RATE(MachineLoad(), last.starts_with("active"));
+  REQUIRE(std::sscanf(last.c_str() + numbers, "at (%lf, %lf, %lf)", &x_m, &y_m, &z_m) == 3);
+  double fx_N = 0.0, fy_N = 0.0;
+  REQUIRE(std::sscanf(last.c_str() + force, "force (%lf, %lf, %lf)", &fx_N, &fy_N, &force_N) == 3);
+  CHECK(z_m == Approx(0.025).margin(1e-6));  // the cube of 50 mm lies on the table
+  CHECK(std::hypot(x_m, y_m) == Approx(0.03).margin(2e-3));
+  CHECK(force_N > 0.8);
+}
+
+TEST_CASE("the Python programs in the guide are the examples", "[python]") {
   const std::string guide = contents("tools/README.md");
-  CHECK(guide.find(printed) != std::string::npos);
+  for (const auto& [name, most] :
+       {std::pair{"tools/python/example.py", 10}, {"tools/python/steer_hand.py", 15}}) {
+    std::istringstream example(contents(name));
+    std::string printed;
+    int lines = 0;
+    for (std::string line; std::getline(example, line);) {
+      if (line.starts_with("#")) continue;
+      printed += line + "\n";
+      lines += line.empty() ? 0 : 1;
+    }
+    CHECK(lines <= most);
+    CHECK(guide.find(printed) != std::string::npos);
+  }
 }

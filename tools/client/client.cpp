@@ -80,6 +80,14 @@ void Client::mark(const std::string& label, const std::map<std::string, Conditio
   connection_->call("record.mark", params);
 }
 
+void Client::move_hand(const std::array<double, 3>& position_m,
+                       const std::array<double, 3>& rotation_vector_rad,
+                       std::chrono::milliseconds expires_after) {
+  connection_->call("hand.set", {{"position_m", position_m},
+                                 {"rotation_vector_rad", rotation_vector_rad},
+                                 {"expires_s", 1e-3 * static_cast<double>(expires_after.count())}});
+}
+
 std::string Client::state() {
   return connection_->call("status", json::object()).value("state", "unknown");
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -71,6 +72,13 @@ class Client {
   void stop() { call("stop"); }  ///< emergency stop; requires no lease
   void acknowledge() { call("acknowledge"); }
   void reinitialize_proxy() { call("reinitialize_proxy"); }
+
+  /// Moves the hand of a simulated device to a pose in the device base: position [m], rotation vector [rad].
+  /// Call it again before it expires; afterwards the hand returns to its path. Throws ClientError for a
+  /// device that a person moves.
+  void move_hand(const std::array<double, 3>& position_m,
+                 const std::array<double, 3>& rotation_vector_rad = {},
+                 std::chrono::milliseconds expires_after = std::chrono::milliseconds(500));
 
   /// Value of a condition of an experiment.
   using Condition = std::variant<double, std::string>;

@@ -133,6 +133,12 @@ class Client:
         them: client.mark("trial 3", stiffness=2000). Returns file and time_ns. Raises Rejected if no recording runs."""
         return self.call("record.mark", label=label, **({"conditions": conditions} if conditions else {}))
 
+    def move_hand(self, position_m, rotation_vector_rad=(0.0, 0.0, 0.0), expires_s=0.5):
+        """Moves the hand of a simulated device to a pose in the device base, at the speed of a person. Call it again before it
+        expires; afterwards the hand returns to its path. Raises Rejected for a device that a person moves."""
+        return self.call("hand.set", position_m=[float(x) for x in position_m],
+                         rotation_vector_rad=[float(x) for x in rotation_vector_rad], expires_s=expires_s)
+
     # Events
 
     def subscribe(self, *names):
