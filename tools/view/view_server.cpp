@@ -5,6 +5,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <deque>
 #include <map>
 #include <optional>
@@ -26,6 +27,7 @@
 #include "daemon/version.hpp"
 #include "tools/view/connection_owner.hpp"
 #include "tools/view/live_feed.hpp"
+#include "tools/view/page_hand.hpp"
 #include "tools/view/page_lease.hpp"
 #include "tools/view/recorded_feed.hpp"
 
@@ -86,6 +88,20 @@ Json times_json(const RollingHistogram::Summary& tick_duration,
           {"wake_latency", summary_json(wake_latency)}};
 }
 
+/// Returns this member of a message, an array of N finite numbers; empty if it is something else.
+template <std::size_t N>
+std::optional<std::array<double, N>> numbers_of(const Json& message, const char* name) {
+  const auto found = message.find(name);
+  if (found == message.end() || !found->is_array() || found->size() != N) return {};
+  std::array<double, N> numbers{};
+  for (std::size_t i = 0; i < N; ++i) {
+    if (!(*found)[i].is_number()) return {};
+    numbers[i] = (*found)[i].get<double>();
+    if (!std::isfinite(numbers[i])) return {};
+  }
+  return numbers;
+}
+
 /// Returns message and remedy of all faults, which every page requires.
 Json faults_json() {
   Json out = Json::object();
@@ -110,6 +126,7 @@ struct ViewServer::Server {
   IdentifyConnection identify;
   std::function<void()> opened;      ///< called once, for the first page
   std::unique_ptr<PageLease> lease;  ///< its threads post to io; the destructor ends them first
+  std::unique_ptr<PageHand> hand;    ///< likewise
   /// Declared after all that a Page uses: the last handlers of a page end with io, and with them the page.
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
@@ -118,7 +135,10 @@ struct ViewServer::Server {
 
   Server(std::uint16_t requested_port, PageFiles page_files);
   void listen(std::uint16_t wanted_port);
-  ~Server() { lease.reset(); }
+  ~Server() {
+    lease.reset();
+    hand.reset();
+  }
   void accept();
   void push_frames();
   void tell(const PageLease::Reply& reply);
@@ -295,6 +315,19 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     if (type == "arm") lease.submit(number_, PageLease::Request::arm);
     if (type == "disarm") lease.submit(number_, PageLease::Request::disarm);
     if (type == "acknowledge") lease.submit(number_, PageLease::Request::acknowledge);
+    if (type == "hand") move_hand(message);
+  }
+
+  /// Message {from, d, r}: pose of the handle when the drag began, displacement and rotation since then.
+  void move_hand(const Json& message) {
+    const auto from = numbers_of<7>(message, "from");
+    const auto d = numbers_of<3>(message, "d"), r = numbers_of<3>(message, "r");
+    if (!from || !d || !r) return disconnect();
+    const auto scene = server_.live->scene();
+    const Pose X_BH = pose_from_numbers(*from);
+    if (!scene || !(X_BH.rotation.norm() > 0.5)) return;  // a tick without a valid pose
+    server_.hand->move(number_, dragged({X_BH.rotation.normalized(), X_BH.translation_m},
+                                        scene->X_WB().rotation, Vector3d(d->data()), Vector3d(r->data())));
   }
 
   void write() {
@@ -505,6 +538,10 @@ ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed, Iden
   server_->lease =
       std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Reply& reply) {
         asio::post(server->io, [server, reply] { server->tell(reply); });
+      });
+  server_->hand = std::make_unique<PageHand>(
+      feed.socket(), [server = server_.get()](std::uint64_t page, const std::string& error) {
+        asio::post(server->io, [server, page, error] { server->tell({page, "hand", false, error}); });
       });
 }
 

@@ -130,6 +130,7 @@ ViewTick view_tick(const TickRecord& record) {
   ViewTick tick;
   tick.tick = record.tick;
   tick.time_ns = record.now_ns;
+  tick.X_BH = record.X_BH;
   tick.X_WP = record.X_WP;
   tick.X_WQ = record.X_WQ;
   tick.F_out = record.F_out;
@@ -170,6 +171,7 @@ Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene*
           {"tick", tick.tick},
           {"state", status.state},
           {"cause", status.cause},
+          {"hand", numbers(tick.X_BH)},
           {"p", numbers(tick.X_WP)},
           {"q", tick.proxy_valid() ? numbers(tick.X_WQ) : Json(nullptr)},
           {"F", numbers(tick.F_out)},

@@ -21,6 +21,7 @@ namespace wrenchd {
 struct ViewTick {
   std::uint64_t tick = 0;
   std::int64_t time_ns = 0;
+  std::array<double, 7> X_BH{};      ///< Pose of the handle in the device base.
   std::array<double, 7> X_WP{};      ///< Commanded pose p.
   std::array<double, 7> X_WQ{};      ///< Proxy pose q; NaN if the proxy is not valid.
   std::array<double, 6> F_out{};     ///< Wrench sent to the device.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The page of wrenchctl view: shows incoming messages and sends the requests of the user.
 import { Connection } from "./connection.js";
+import { ToolDrag } from "./drag.js";
 import { History, Plots } from "./plots.js";
 import { World } from "./world.js";
 
@@ -295,6 +296,7 @@ const connection = new Connection({
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
   reply({ request, accepted, error }) {
+    if (!accepted && request === "hand") toolDrag.end();
     if (!accepted && error !== "") toast(request === "lease" ? error : `${request}: ${error}`);
   },
   lost() {
@@ -307,7 +309,12 @@ const connection = new Connection({
   },
 });
 
-// --- buttons and keys ---
+// --- buttons, keys and mouse ---
+
+const toolDrag = new ToolDrag(world, {
+  handPose: () => (mode === "live" && connected && link.status?.device.simulated ? frame?.hand ?? null : null),
+  send: (goal) => connection.send("hand", goal),
+});
 
 const request = (name) => mode === "live" && connection.send(name);
 $("arm").onclick = () => request("arm");
@@ -413,6 +420,7 @@ window.view = {
   frame: () => frame,
   page: () => page,
   world: () => world.inspect(),
+  toolOnScreen: () => world.toolOnScreen(),
   history: () => history,
   times: () => times,
   player,

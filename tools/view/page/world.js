@@ -303,6 +303,38 @@ export class World {
     this.changed = true;
   }
 
+  /** Returns the distance along the line of sight to the tool at this point of the screen [m]; null if another thing is there. */
+  distanceToTool({ clientX, clientY }) {
+    if (!this.tool) return null;
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height), this.camera);
+    const bodies = [this.tool, this.ghost].filter(({ visible }) => visible);
+    const hit = ray.intersectObjects(bodies.map((body) => body.children[0]), false)[0];
+    if (!hit) return null;
+    const { forward } = this.screenAxes();
+    return hit.point.sub(this.camera.position).dot(new THREE.Vector3(...forward));
+  }
+
+  /** Returns the unit vectors of the screen in the world. */
+  screenAxes() {
+    this.camera.updateMatrixWorld();
+    const axis = (i) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, i);
+    return { right: axis(0).toArray(), up: axis(1).toArray(), forward: axis(2).negate().toArray() };
+  }
+
+  metresPerPixel(distance_m) {
+    return (2 * distance_m * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
+  }
+
+  /** Returns the point of the screen at which the tool's centre of mass is drawn. */
+  toolOnScreen() {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    const at = this.tool.position.clone().project(this.camera);
+    return [left + (width * (at.x + 1)) / 2, top + (height * (1 - at.y)) / 2];
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
     if (width === 0 || height === 0) return;
