@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -23,10 +24,12 @@
 #include <sys/random.h>
 #include <unistd.h>
 
+#include "config/toml_files.hpp"
 #include "core/fault.hpp"
 #include "daemon/version.hpp"
 #include "tools/view/connection_owner.hpp"
 #include "tools/view/live_feed.hpp"
+#include "tools/view/page_calls.hpp"
 #include "tools/view/page_hand.hpp"
 #include "tools/view/page_lease.hpp"
 #include "tools/view/recorded_feed.hpp"
@@ -110,6 +113,14 @@ Json faults_json() {
   return out;
 }
 
+/// Returns the names of the scenes along the search path, as scene.load takes them.
+Json scenes_json() {
+  Json names = Json::array();
+  for (const std::filesystem::path& file : toml_files("scenes", SearchPath()))
+    names.push_back("scenes/" + file.filename().string());
+  return names;
+}
+
 }  // namespace
 
 struct ViewServer::Server {
@@ -127,6 +138,7 @@ struct ViewServer::Server {
   std::function<void()> opened;      ///< called once, for the first page
   std::unique_ptr<PageLease> lease;  ///< its threads post to io; the destructor ends them first
   std::unique_ptr<PageHand> hand;    ///< likewise
+  std::unique_ptr<PageCalls> calls;  ///< likewise
   /// Declared after all that a Page uses: the last handlers of a page end with io, and with them the page.
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
@@ -138,10 +150,12 @@ struct ViewServer::Server {
   ~Server() {
     lease.reset();
     hand.reset();
+    calls.reset();
   }
   void accept();
   void push_frames();
   void tell(const PageLease::Reply& reply);
+  void tell(const PageCalls::Reply& reply);
   bool is_permitted(const tcp::socket& socket) const;
 
   bool is_ours(beast::string_view authority) const {
@@ -251,7 +265,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
       if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"error", feed->scene_error()}});
       at(0.0);
     } else {
-      hello["mode"] = "live";
+      hello.update({{"mode", "live"}, {"scenes", scenes_json()}});
       send(hello);
     }
   }
@@ -316,6 +330,16 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     if (type == "disarm") lease.submit(number_, PageLease::Request::disarm);
     if (type == "acknowledge") lease.submit(number_, PageLease::Request::acknowledge);
     if (type == "hand") move_hand(message);
+    if (type == "call") call(message);
+  }
+
+  /// Message {id, method, params}: a call of the drawer.
+  void call(const Json& message) {
+    const auto id = message.find("id"), method = message.find("method"), params = message.find("params");
+    if (id == message.end() || !id->is_number_unsigned() || method == message.end() || !method->is_string() ||
+        params == message.end() || !params->is_object())
+      return disconnect();
+    server_.calls->submit({number_, id->get<std::uint64_t>(), method->get<std::string>(), *params});
   }
 
   /// Message {from, d, r}: pose of the handle when the drag began, displacement and rotation since then.
@@ -527,6 +551,13 @@ void ViewServer::Server::tell(const PageLease::Reply& reply) {
                 {"error", reply.error}});
 }
 
+void ViewServer::Server::tell(const PageCalls::Reply& reply) {
+  const auto found = pages.find(reply.page);
+  if (found == pages.end()) return;
+  if (const auto page = found->second.lock())
+    page->send({{"type", "result"}, {"id", reply.id}, {"result", reply.result}, {"error", reply.error}});
+}
+
 std::optional<uid_t> ViewServer::identify_connection(std::uint16_t peer_port, std::uint16_t own_port) {
   return connection_owner(peer_port, own_port);
 }
@@ -541,7 +572,13 @@ ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed, Iden
       });
   server_->hand = std::make_unique<PageHand>(
       feed.socket(), [server = server_.get()](std::uint64_t page, const std::string& error) {
-        asio::post(server->io, [server, page, error] { server->tell({page, "hand", false, error}); });
+        asio::post(server->io, [server, page, error] {
+          server->tell(PageLease::Reply{page, "hand", false, error});
+        });
+      });
+  server_->calls =
+      std::make_unique<PageCalls>(feed.socket(), [server = server_.get()](const PageCalls::Reply& reply) {
+        asio::post(server->io, [server, reply] { server->tell(reply); });
       });
 }
 

@@ -29,6 +29,8 @@ export class Connection {
   /** handlers: functions by message type, and mesh, history, lost. */
   constructor(handlers) {
     this.handlers = handlers;
+    this.calls = new Map();  // promises of calls without a reply, by their id
+    this.lastCall = 0;
     this.open();
   }
 
@@ -39,6 +41,8 @@ export class Connection {
     this.socket.binaryType = "arraybuffer";
     this.socket.onmessage = (event) => this.take(event.data);
     this.socket.onclose = () => {
+      for (const { reject } of this.calls.values()) reject(new Error("The connection to wrenchctl view has ended."));
+      this.calls.clear();
       this.handlers.lost();
       setTimeout(() => this.open(), 1000);
     };
@@ -52,7 +56,23 @@ export class Connection {
       return;
     }
     const message = JSON.parse(data);
+    if (message.type === "result") return this.settle(message);
     this.handlers[message.type]?.(message);
+  }
+
+  settle({ id, result, error }) {
+    const call = this.calls.get(id);
+    this.calls.delete(id);
+    if (error === "") call?.resolve(result);
+    else call?.reject(new Error(error));
+  }
+
+  /** Calls a method of the daemon. Returns a promise of its result, which rejects with the daemon's reason. */
+  call(method, params) {
+    if (this.socket.readyState !== WebSocket.OPEN) return Promise.reject(new Error("There is no connection to wrenchctl view."));
+    const id = ++this.lastCall;
+    this.send("call", { id, method, params });
+    return new Promise((resolve, reject) => this.calls.set(id, { resolve, reject }));
   }
 
   send(type, more = {}) {

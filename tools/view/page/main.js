@@ -2,6 +2,7 @@
 // The page of wrenchctl view: shows incoming messages and sends the requests of the user.
 import { Connection } from "./connection.js";
 import { ToolDrag } from "./drag.js";
+import { Drawer } from "./drawer.js";
 import { History, Plots } from "./plots.js";
 import { World } from "./world.js";
 
@@ -250,7 +251,7 @@ const connection = new Connection({
     page = hello.page;
     faults = hello.faults;
     document.title = mode === "live" ? "wrenchd" : `${hello.name} – wrenchd`;
-    if (mode !== "recording") return;
+    if (mode !== "recording") return drawer.setScenes(hello.scenes);
     connected = true;
     rate_Hz = hello.rate_Hz;
     Object.assign(player, { duration: hello.duration_s, changes: hello.changes, markers: hello.markers, requested: false });
@@ -290,6 +291,7 @@ const connection = new Connection({
     showTimes();
   },
   event({ event }) {
+    drawer.event(event);
     if (event.name === "arming_rejected" || event.name === "reload") toast(event.text);
     if (event.name === "waits") waits = event;
     if (event.name === "marker") set("marker", markerText(event));
@@ -314,6 +316,11 @@ const connection = new Connection({
 const toolDrag = new ToolDrag(world, {
   handPose: () => (mode === "live" && connected && link.status?.device.simulated ? frame?.hand ?? null : null),
   send: (goal) => connection.send("hand", goal),
+});
+
+const drawer = new Drawer({
+  call: (method, params) => connection.call(method, params),
+  clocks: () => ({ tick_s: frame?.t ?? null, wall_s: Date.now() / 1e3 }),
 });
 
 const request = (name) => mode === "live" && connection.send(name);
@@ -360,7 +367,7 @@ const common = {
 };
 const keys = {
   live: { " ": () => request("stop"), Escape: () => request("stop"), a: () => !$("arm").disabled && request("arm"),
-    d: () => request("disarm"), k: () => !$("acknowledge").disabled && request("acknowledge") },
+    d: () => request("disarm"), s: () => drawer.toggle(), k: () => !$("acknowledge").disabled && request("acknowledge") },
   recording: { " ": () => play(!player.playing), ArrowLeft: (e) => seek(player.t - (e.shiftKey ? 1 : 0.1)),
     ArrowRight: (e) => seek(player.t + (e.shiftKey ? 1 : 0.1)), ",": () => seek(player.t - 1 / rate_Hz),
     ".": () => seek(player.t + 1 / rate_Hz), Home: () => seek(0), End: () => seek(player.duration) },
@@ -370,6 +377,8 @@ const keys = {
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  // While text is typed, its letters and spaces are text.
+  if (event.target.matches("input:not([type=range], [type=checkbox])") && key !== "Escape") return;
   const own = keys[mode][key];
   if (!own && event.target instanceof HTMLSelectElement) return;
   const act = own ?? common[key];
