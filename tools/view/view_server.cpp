@@ -137,8 +137,8 @@ struct ViewServer::Server {
   IdentifyConnection identify;
   std::function<void()> opened;      ///< called once, for the first page
   std::unique_ptr<PageLease> lease;  ///< its threads post to io; the destructor ends them first
-  std::unique_ptr<PageHand> hand;    ///< likewise
-  std::unique_ptr<PageCalls> calls;  ///< likewise
+  std::unique_ptr<PageHand> hand;    ///< its thread posts to io; the destructor ends it first
+  std::unique_ptr<PageCalls> calls;  ///< its thread posts to io; the destructor ends it first
   /// Declared after all that a Page uses: the last handlers of a page end with io, and with them the page.
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
