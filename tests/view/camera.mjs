@@ -39,5 +39,34 @@ test(async () => {
   assert.ok(away((await camera()).eye, turned) < 1e-9);
   await page.keyboard.press("f");
   await until("Fit goes back", seen_from([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]));
+
+  // From the top, the front and the side; the tool is then near the middle of the picture.
+  for (const [key, axis, sign] of [["1", 2, 1], ["2", 0, -1], ["3", 1, -1]]) {
+    await page.keyboard.press(key);
+    const now = await camera();
+    const sight = now.eye.map((x, i) => x - now.target[i]);
+    assert.ok(sign * sight[axis] > 0.999 * Math.hypot(...sight), `key ${key}: ${sight}`);
+    const [x, y] = await page.evaluate(() => window.view.toolOnScreen());
+    const canvas = await page.locator("#canvas").boundingBox();
+    assert.ok(x > canvas.x && x < canvas.x + canvas.width && y > canvas.y && y < canvas.y + canvas.height, `key ${key}: the tool is at ${x}, ${y}`);
+  }
+
+  // The scale: its length on the screen is that of two points which are so far apart beside the target.
+  const scale = await page.evaluate(() => window.view.scale());
+  const line = await page.locator("#scale-line").boundingBox();
+  assert.ok(Math.abs(line.width - scale.width_px) < 2 && line.width > 30 && line.width < 120);
+  assert.match(await page.locator("#scale-text").textContent(), /^[\d.]+ (m|mm|um); force arrow [\d.]+ N$/);
+
+  // The camera follows the tool of a hand that moves, at a constant distance.
+  await page.keyboard.press("l");
+  assert.equal(await page.locator("#follow").getAttribute("aria-pressed"), "true");
+  const gap = () => page.evaluate(() => {
+    const { eye, ghost } = window.view.world();
+    return { gap: eye.map((x, i) => x - ghost[i]), ghost };
+  });
+  const start = await gap();
+  await until("the tool has moved", async () => away((await gap()).ghost.slice(0, 3), start.ghost.slice(0, 3)) > 2e-3);
+  assert.ok(away((await gap()).gap, start.gap) < 1e-6);
+  await page.keyboard.press("l");
   assert.deepEqual(page.complaints(), []);
 });

@@ -173,6 +173,26 @@ function showTriangleCount() {
   set("note", shown < sceneTriangles ? `${sceneTriangles.toLocaleString("en")} triangles, drawn with ${shown.toLocaleString("en")}` : "");
 }
 
+/** Draws the axes of the world as the camera sees them, and a length with the force whose arrow has this length. */
+function showMeasure() {
+  const { right, up, forward } = world.screenAxes();
+  ["x", "y", "z"].forEach((name, i) => {
+    const axis = document.querySelector(`#triad [data-axis="${name}"]`);
+    const [line, letter] = axis.children;
+    const [x, y] = [right[i], -up[i]].map((part) => part.toFixed(3));
+    line.setAttribute("x2", 20 * x);
+    line.setAttribute("y2", 20 * y);
+    letter.setAttribute("x", 27 * x);
+    letter.setAttribute("y", 27 * y);
+    letter.style.opacity = Math.hypot(x, y) < 0.15 ? 0 : 1;  // an axis along the line of sight
+    axis.style.opacity = forward[i] > 0.3 ? 0.6 : 1;
+  });
+  const { length_m, width_px, force_N } = world.scale();
+  const length = length_m >= 1 ? `${length_m} m` : length_m >= 1e-3 ? `${Number((1e3 * length_m).toPrecision(1))} mm` : `${Number((1e6 * length_m).toPrecision(1))} um`;
+  set("scale-text", `${length}; force arrow ${Number(force_N.toPrecision(2))} N`);
+  $("scale-line").style.width = `${width_px.toFixed(0)}px`;
+}
+
 let toastEnds = 0;
 function toast(text) {
   $("toast").hidden = false;
@@ -329,6 +349,14 @@ $("disarm").onclick = () => request("disarm");
 $("acknowledge").onclick = () => request("acknowledge");
 $("stop").onclick = () => request("stop");
 $("fit").onclick = () => world.fit(frame?.p);
+const look = (from) => world.fit(frame?.p, from);
+const follow = (on) => {
+  world.follow(on);
+  $("follow").setAttribute("aria-pressed", String(on));
+};
+const toggleFollow = () => follow($("follow").getAttribute("aria-pressed") !== "true");
+for (const from of ["top", "front", "side"]) $(`view-${from}`).onclick = () => look(from);
+$("follow").onclick = toggleFollow;
 $("help").onclick = () => $("keys").showModal();
 $("play").onclick = () => play(!player.playing);
 $("scrub").oninput = () => {
@@ -362,6 +390,10 @@ const common = {
     world.showGhost = !world.showGhost;
     if (frame) world.take(frame);
   },
+  1: () => look("top"),
+  2: () => look("front"),
+  3: () => look("side"),
+  l: toggleFollow,
   t: nextTheme,
   "?": () => ($("keys").open ? $("keys").close() : $("keys").showModal()),
 };
@@ -406,6 +438,7 @@ function draw(now) {
   if (frame) showFrame(frame);
   showButtons();
   world.draw(now);
+  showMeasure();
   showTriangleCount();
   if (now - plotted > PLOT_INTERVAL_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
@@ -429,6 +462,7 @@ window.view = {
   frame: () => frame,
   page: () => page,
   world: () => world.inspect(),
+  scale: () => world.scale(),
   toolOnScreen: () => world.toolOnScreen(),
   history: () => history,
   times: () => times,

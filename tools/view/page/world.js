@@ -26,9 +26,13 @@ function round125(x) {
  * draws asynchronously. The scene counts as static if nothing has moved for AT_REST_MS.
  */
 const SLOW_MS = 60, OVER_FRAMES = 8, AT_REST_MS = 400;
+const ARROW_RADII_PER_N = 2 / 3;  // length of the force arrow, in radii of the tool
 const MOST_MS = 150;  // clamps the first frames, which compile shaders
 
 const UP = new THREE.Vector3(0, 1, 0);
+
+/** Directions from the scene to the camera, in the world. A camera exactly above would have no upward direction: x is up there. */
+const VIEWPOINTS = { top: [-1e-4, 0, 1], front: [-1, 0, 0], side: [0, -1, 0] };
 
 /** An arrow of any length and thickness, along +Y before its rotation. */
 class Arrow extends THREE.Group {
@@ -234,6 +238,7 @@ export class World {
     if (this.tool) {
       this.ghost.visible = this.showGhost;
       place(this.ghost, frame.p);
+      if (this.followed) this.followTool();
       this.tool.visible = frame.q !== null;
       if (frame.q !== null) place(this.tool, frame.q);
     }
@@ -264,14 +269,14 @@ export class World {
   /** Draws the wrench: the arrow of 3 N has twice the tool radius; the arc of 0.1 N.m has about the tool radius. */
   push({ at, force, torque }) {
     const from = new THREE.Vector3(...at), f = new THREE.Vector3(...force), m = new THREE.Vector3(...torque);
-    this.force.point(from, f.multiplyScalar((2 * this.size) / 3), 0.03 * this.size);
+    this.force.point(from, f.multiplyScalar(ARROW_RADII_PER_N * this.size), 0.03 * this.size);
     const strength = m.length();
     const radius = strength < 1e-3 ? 0 : this.size * Math.min(0.25 + strength / 0.1, 1.5);
     this.torque.about(from, strength > 0 ? m.divideScalar(strength) : UP, radius);
   }
 
-  /** Moves the camera so that the tool and the obstacles around it are visible, from above and from the side. */
-  fit(p) {
+  /** Returns the centre of the tool and the obstacles around it, and the distance from which all are visible. p: pose of the tool. */
+  around(p) {
     const target = p ? new THREE.Vector3(p[0], p[1], p[2]) : this.ghost ? this.ghost.position.clone() : new THREE.Vector3();
     const box = new THREE.Box3();
     for (const body of this.obstacles) {
@@ -285,10 +290,17 @@ export class World {
     const sphere = box.getBoundingSphere(new THREE.Sphere());
     const radius = Math.min(sphere.radius, 12 * this.size);  // keeps the tool visible in large scenes
     const centre = radius < sphere.radius ? target : sphere.center;
-    const distance = (0.95 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
-    const aside = new THREE.Vector3(-0.62, -0.78, 0.55).normalize();
-    this.camera.position.copy(centre).addScaledVector(aside, distance);
-    if (this.view) {  // the scene defines its own viewpoint
+    return { centre: centre.clone(), distance: (0.95 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) };
+  }
+
+  /**
+   * Moves the camera so that the tool and the obstacles around it are visible. from: a name of VIEWPOINTS; without one, from
+   * the viewpoint of the scene, else from above and from the side.
+   */
+  fit(p, from) {
+    const { centre, distance } = this.around(p);
+    this.camera.position.copy(centre).addScaledVector(new THREE.Vector3(...(VIEWPOINTS[from] ?? [-0.62, -0.78, 0.55])).normalize(), distance);
+    if (this.view && !from) {
       this.camera.position.set(...this.view.eye_m);
       centre.set(...this.view.target_m);
     }
@@ -299,8 +311,21 @@ export class World {
     this.controls.target.copy(centre);
     this.controls.update();
     this.fitted = true;
-    this.touched = false;
+    this.touched = from !== undefined;
     this.changed = true;
+  }
+
+  /** Moves the camera with the tool, or lets it rest. */
+  follow(on) {
+    this.followed = on && this.ghost ? this.ghost.position.clone() : null;
+  }
+
+  followTool() {
+    const moved = this.ghost.position.clone().sub(this.followed);
+    this.followed.copy(this.ghost.position);
+    this.camera.position.add(moved);
+    this.controls.target.add(moved);
+    this.controls.update();
   }
 
   /** Returns the distance along the line of sight to the tool at this point of the screen [m]; null if another thing is there. */
@@ -321,6 +346,13 @@ export class World {
     this.camera.updateMatrixWorld();
     const axis = (i) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, i);
     return { right: axis(0).toArray(), up: axis(1).toArray(), forward: axis(2).negate().toArray() };
+  }
+
+  /** Returns a length of 1, 2 or 5 times a power of ten [m], its width on the screen, and the force whose arrow has this length. */
+  scale() {
+    const m_per_px = this.metresPerPixel(this.camera.position.distanceTo(this.controls.target));
+    const length_m = round125(110 * m_per_px);
+    return { length_m, width_px: length_m / m_per_px, force_N: length_m / (this.size * ARROW_RADII_PER_N) };
   }
 
   metresPerPixel(distance_m) {
