@@ -12,6 +12,7 @@ test(async () => {
   const server = await view(["--socket", wrenchd.socket]);
   const page = await open(server.url, { viewport: { width: 700, height: 500 } });
   await until("the tool is there", () => page.evaluate(() => window.view.world().ghost !== null && window.view.frame().q !== null));
+  await until("the page knows that the device is simulated", async () => (await text(page, "device")) === "present");
   const pose = () => page.evaluate(() => window.view.frame().hand);
   const eye = () => page.evaluate(() => window.view.world().eye);
   const rest = await pose();
