@@ -17,13 +17,17 @@ test(async () => {
   const eye = () => page.evaluate(() => window.view.world().eye);
   const rest = await pose();
   assert.ok(Math.abs(rest[2] - 0.065) < 1e-3);
-  const grab = async (button) => {
+  // The camera may still be moving to its place when the tool is aimed at, so a miss is tried again.
+  const grab = (button) => until("the tool is grabbed", async () => {
     const [x, y] = await page.evaluate(() => window.view.toolOnScreen());
     await page.mouse.move(x, y);
     await page.keyboard.down("Shift");
     await page.mouse.down({ button });
-    return [x, y];
-  };
+    if (await page.evaluate(() => window.view.dragging())) return [x, y];
+    await page.mouse.up({ button });
+    await page.keyboard.up("Shift");
+    return null;
+  });
   const release = async (button) => {
     await page.mouse.up({ button });
     await page.keyboard.up("Shift");

@@ -463,6 +463,7 @@ window.view = {
   page: () => page,
   world: () => world.inspect(),
   scale: () => world.scale(),
+  dragging: () => Boolean(toolDrag.drag),
   toolOnScreen: () => world.toolOnScreen(),
   history: () => history,
   times: () => times,
