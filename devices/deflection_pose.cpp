@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "devices/clamp_norm.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -12,11 +14,6 @@ constexpr double kMinResponse = 1e-4;
 /// Tolerances for rounding and for the clearance of the proxy. Smaller distances are not corrected.
 constexpr double kDistanceTolerance_m = 1e-7;
 constexpr double kAngleTolerance_rad = 1e-6;
-
-Vector3d clamp_norm(const Vector3d& v, double max_norm) noexcept {
-  const double length = v.norm();
-  return length <= max_norm ? v : Vector3d(v * (max_norm / length));
-}
 
 /// Returns the cosine between a deflection and an offset, clamped to 0 .. 1.
 double alignment(const Vector3d& t, const Vector3d& w) noexcept {

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/simulation/hand_motion.hpp"
 
+#include "devices/clamp_norm.hpp"
+
 namespace wrenchd {
 namespace {
 
 /// Distance from the path at which the hand is on it again. Far below an encoder step.
 constexpr double kOnPath_m = 1e-7;
 constexpr double kOnPath_rad = 1e-6;
-
-Vector3d clamp_norm(const Vector3d& v, double max_norm) noexcept {
-  const double length = v.norm();
-  return length > max_norm ? Vector3d(v * (max_norm / length)) : v;
-}
 
 Vector3d next_velocity(const Vector3d& v, const Vector3d& v_path, const Vector3d& error, double max_speed,
                        double max_change) noexcept {

@@ -67,7 +67,7 @@ class SimulatedArm final : public DeviceInHand {
   Pose X_BD_, X_DB_, X_EH_, X_HE_;
   bool has_wrist_;  ///< true if the arm has a wrist
   HandMotion hand_;
-  HandTarget target_;  ///< of the hand, as far as the arm can rotate
+  HandTarget target_;  ///< pose and twist that the hand aims at; an arm without a wrist keeps its rotation
   std::unique_ptr<EmulatedArm> arm_;
   SimulatedHandle handle_;
   Configuration configuration_;  ///< configuration at the pose of the handle

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/finite.hpp"
+#include "devices/clamp_norm.hpp"
 
 namespace wrenchd {
 namespace {
@@ -29,11 +30,6 @@ void check(const char* which, double inertia, double stiffness, std::initializer
 }
 
 /// Scales a vector to a maximum length.
-Vector3d clamp_norm(const Vector3d& v, double max_norm) noexcept {
-  const double length = v.norm();
-  return length > max_norm ? Vector3d(v * (max_norm / length)) : v;
-}
-
 /// Returns the rotation from one orientation to another, as axis times 2 sin(angle/2).
 Vector3d chord(const Quaterniond& from, const Quaterniond& to) noexcept {
   const Quaterniond rotation = to * from.conjugate();
