@@ -10,6 +10,7 @@
 #include <wrenchd/client.hpp>
 
 #include "tests/support/run_program.hpp"
+#include "tests/support/soon.hpp"
 #include "tests/support/stub_daemon.hpp"
 
 using namespace wrenchd;
@@ -17,15 +18,6 @@ using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
 namespace {
-
-template <class Done>
-bool soon(const Done& done) {
-  for (int i = 0; i < 1000; ++i) {
-    if (done()) return true;
-    std::this_thread::sleep_for(10ms);
-  }
-  return false;
-}
 
 template <class Act>
 int code_of(const Act& act) {

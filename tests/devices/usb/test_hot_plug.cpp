@@ -11,6 +11,7 @@
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
+#include "tests/support/soon.hpp"
 
 // The complete daemon as a process, with a device that is connected and disconnected.
 
@@ -79,13 +80,8 @@ class LiveHandle : ReportSink {
   std::thread thread_;
 };
 
-template <class Condition>
-bool soon(const Condition& condition) {
-  for (const auto end = std::chrono::steady_clock::now() + 60s; std::chrono::steady_clock::now() < end;
-       std::this_thread::sleep_for(5ms))
-    if (condition()) return true;
-  return false;
-}
+/// A mock on a busy machine is slow.
+constexpr auto kLimit = 60s;
 
 /// Exit code of wrenchd after a fault. On a busy machine a late tick is a fault.
 constexpr int kExitFault = 3;
@@ -116,7 +112,7 @@ TEST_CASE("wrenchd waits for its device and, after it is connected again, is dis
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE_RATE(load, wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
-  REQUIRE_RATE(load, soon([&] { return handle->was_pushed(); }));  // --arm armed it
+  REQUIRE_RATE(load, soon([&] { return handle->was_pushed(); }, kLimit));  // --arm armed it
   handle->unplug();
   REQUIRE_RATE(load, wrenchd.wait_for_output("device_lost: "));
   handle.reset();
@@ -131,7 +127,7 @@ TEST_CASE("wrenchd waits for its device and, after it is connected again, is dis
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
   REQUIRE_RATE(load, wrenchd.wait_for_output(
                          "the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
-  REQUIRE_RATE(load, soon([&] { return handle->commands() > 300; }));
+  REQUIRE_RATE(load, soon([&] { return handle->commands() > 300; }, kLimit));
   CHECK_FALSE(handle->was_pushed());
 
   wrenchd.signal(SIGTERM);
@@ -148,7 +144,7 @@ TEST_CASE("without a profile name wrenchd selects the profile of the device", "[
   const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
   RunningProgram wrenchd("wrenchd", {"--profile", "auto", "--realtime", "best_effort"});
   REQUIRE_RATE(load, wrenchd.wait_for_output("device reference_full_speed"));
-  REQUIRE_RATE(load, soon([&] { return handle.commands() > 10; }));
+  REQUIRE_RATE(load, soon([&] { return handle.commands() > 10; }, kLimit));
   wrenchd.signal(SIGTERM);
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
 }
@@ -169,11 +165,11 @@ TEST_CASE("a device that requires calibration is not armed before it", "[usb]") 
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
   unsetenv("STATE_DIRECTORY");
   if (calibrated) {
-    REQUIRE_RATE(load, soon([&] { return handle.was_pushed(); }));
+    REQUIRE_RATE(load, soon([&] { return handle.was_pushed(); }, kLimit));
   } else {
     REQUIRE_RATE(load, wrenchd.wait_for_output(
                            "cannot be armed: it is not calibrated; run wrenchctl calibrate patient"));
-    REQUIRE_RATE(load, soon([&] { return handle.commands() > 300; }));
+    REQUIRE_RATE(load, soon([&] { return handle.commands() > 300; }, kLimit));
     CHECK_FALSE(handle.was_pushed());
   }
   wrenchd.signal(SIGTERM);
@@ -191,9 +187,12 @@ TEST_CASE("wrenchctl calibrate asks for the axes and stores nothing if it is sto
   const LiveHandle handle(machine, {});
   RunningProgram wrenchctl("wrenchctl", {"calibrate", profile});
   unsetenv("STATE_DIRECTORY");
-  REQUIRE_RATE(load, soon([&] {
-                 return wrenchctl.out().find("Push the handle straight away from you.") != std::string::npos;
-               }));
+  REQUIRE_RATE(load, soon(
+                         [&] {
+                           return wrenchctl.out().find("Push the handle straight away from you.") !=
+                                  std::string::npos;
+                         },
+                         kLimit));
   wrenchctl.signal(SIGINT);
   const ProgramResult result = wrenchctl.wait();
   CHECK(result.exit_code == 1);

@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <chrono>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/soon.hpp"
 #include "tests/support/stub_daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/page_calls.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
-using namespace std::chrono_literals;
 
 namespace {
 
@@ -29,11 +27,7 @@ class Replies {
     return all_;
   }
   bool wait_for(std::size_t count) const {
-    for (int i = 0; i < 1500; ++i) {
-      if (all().size() >= count) return true;
-      std::this_thread::sleep_for(10ms);
-    }
-    return false;
+    return soon([&] { return all().size() >= count; });
   }
 
  private:

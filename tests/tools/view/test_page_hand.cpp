@@ -8,6 +8,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/soon.hpp"
 #include "tests/support/stub_daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/page_hand.hpp"
@@ -17,15 +18,6 @@ using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
 namespace {
-
-template <class Done>
-bool soon(const Done& done) {
-  for (int i = 0; i < 500; ++i) {
-    if (done()) return true;
-    std::this_thread::sleep_for(10ms);
-  }
-  return false;
-}
 
 struct Rejections {
   std::mutex mutex;

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/rate_check.hpp"
+#include "tests/support/soon.hpp"
 #include "tests/support/stub_daemon.hpp"
 #include "tools/view/page_lease.hpp"
 
@@ -17,15 +18,6 @@ using namespace std::chrono_literals;
 namespace {
 
 using Request = PageLease::Request;
-
-template <class Done>
-bool soon(const Done& done) {
-  for (int i = 0; i < 500; ++i) {
-    if (done()) return true;
-    std::this_thread::sleep_for(10ms);
-  }
-  return false;
-}
 
 /// A daemon, a page lease, and the replies that the lease sends to its pages.
 struct Rig {
