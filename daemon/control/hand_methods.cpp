@@ -4,35 +4,32 @@
 #include <chrono>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "core/clock.hpp"
+#include "daemon/control/vector_param.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Farthest goal from the origin of the device base: farther than an arm reaches.
+/// Largest distance of a goal from the origin of the device base; no arm reaches farther.
 constexpr double kMaxDistance_m = 1.0;
 constexpr double kMaxRotation_rad = 6.2831853071795865;
 constexpr double kMinExpiry_s = 0.01, kMaxExpiry_s = 60.0;
 constexpr double kDefaultExpiry_s = 0.5;
 
-Vector3d vector_of(const Json& params, const char* name) {
-  const auto found = params.find(name);
-  if (found == params.end()) return Vector3d::Zero();
-  return {(*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>()};
-}
-
-void check_length(const char* parameter, const Vector3d& v, double limit, const char* unit) {
+void check_length(const char* parameter, const Vector3d& v, double limit, const char* limit_text) {
   if (v.norm() <= limit) return;
-  throw RpcError(RpcCode::invalid_params, "'" + std::string(parameter) + "' is " + std::to_string(v.norm()) +
-                                              " " + unit + " long; a hand goes at most " +
-                                              std::to_string(limit) + " " + unit + " from the device base.");
+  throw RpcError(RpcCode::invalid_params, "'" + std::string(parameter) + "' has a length of " +
+                                              fmt::format("{:.3f}", v.norm()) + "; set a goal within " +
+                                              limit_text + ".");
 }
 
 HandGoal goal_of(const Json& params) {
-  const Vector3d position_m = vector_of(params, "position_m");
-  const Vector3d rotation_rad = vector_of(params, "rotation_vector_rad");
-  check_length("position_m", position_m, kMaxDistance_m, "m");
-  check_length("rotation_vector_rad", rotation_rad, kMaxRotation_rad, "rad");
+  const Vector3d position_m = vector_of(params, "position_m", Vector3d::Zero());
+  const Vector3d rotation_rad = vector_of(params, "rotation_vector_rad", Vector3d::Zero());
+  check_length("position_m", position_m, kMaxDistance_m, "1 m of the device base");
+  check_length("rotation_vector_rad", rotation_rad, kMaxRotation_rad, "one turn (6.28 rad)");
   const double expires_s = params.value("expires_s", kDefaultExpiry_s);
   if (expires_s < kMinExpiry_s || expires_s > kMaxExpiry_s)
     throw RpcError(RpcCode::invalid_params,
@@ -45,7 +42,7 @@ HandGoal goal_of(const Json& params) {
   throw RpcError(
       RpcCode::invalid_state,
       config.simulated
-          ? "The hand of this simulated device is in another process and cannot be moved from here."
+          ? "The hand of this simulated device is in another process; move it by the means of that process."
           : "A person moves this device. Only the hand of a simulated device can be moved: start "
             "wrenchd with --simulate.");
 }
@@ -67,12 +64,13 @@ void add_hand_methods(MethodTable& table, DeviceInHand* device, const RunConfig&
       "hand.set",
       Role::operator_,
       {{"position_m", ParamType::vector, true, "goal of the handle in the device base"},
-       {"rotation_vector_rad", ParamType::vector, false, "its rotation in the device base; default: none"},
+       {"rotation_vector_rad", ParamType::vector, false,
+        "rotation of the handle in the device base; default: none"},
        {"expires_s", ParamType::number, false,
         "time until the hand returns to its path, 0.01 to 60 s; default: 0.5 s"}},
       "Moves the hand of a simulated device to a pose, at the speed of a person (at most 1.25 m/s). Send it "
-      "again before it expires to steer the hand; afterwards the hand returns to its path. Returns when it "
-      "expires, on CLOCK_MONOTONIC.",
+      "again before it expires to steer the hand; afterwards the hand returns to its path. Returns "
+      "expires_ns, the time at which the goal expires, on CLOCK_MONOTONIC.",
       [device, &config](const Json& params, const Caller&) { return set_goal(device, config, params); }});
 }
 

@@ -12,15 +12,10 @@
 #include "config/config_error.hpp"
 #include "config/search_path.hpp"
 #include "daemon/control/scene_geometry.hpp"
+#include "daemon/control/vector_param.hpp"
 
 namespace wrenchd {
 namespace {
-
-Vector3d vector_of(const Json& params, const char* name, const Vector3d& otherwise) {
-  const auto found = params.find(name);
-  if (found == params.end()) return otherwise;
-  return {(*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>()};
-}
 
 double number_or(const Json& params, const char* name, double otherwise) {
   const auto found = params.find(name);

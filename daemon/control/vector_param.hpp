@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/spatial.hpp"
+#include "daemon/control/json_rpc.hpp"
+
+namespace wrenchd {
+
+/// Returns a parameter of three numbers; `otherwise` if the request has no such parameter. Precondition: the
+/// method table has checked the type (ParamType::vector). Not RT-safe.
+inline Vector3d vector_of(const Json& params, const char* name, const Vector3d& otherwise) {
+  const auto found = params.find(name);
+  if (found == params.end()) return otherwise;
+  return {(*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>()};
+}
+
+}  // namespace wrenchd
