@@ -58,15 +58,18 @@ void PageCalls::run(const std::stop_token& stop) {
   }
 }
 
+/// Returns the result as JSON text. scene.load has a connection of its own, because a connection has one
+/// timeout.
+std::string PageCalls::send(const Call& call) {
+  if (call.method == "scene.load") return Client(socket_, kLoadTimeout).call(call.method, call.params.dump());
+  if (!client_) client_.emplace(socket_, kResponseTimeout);
+  return client_->call(call.method, call.params.dump());
+}
+
 PageCalls::Reply PageCalls::execute(const Call& call) {
   Reply reply{call.page, call.id, {}, {}};
   try {
-    if (call.method == "scene.load") {
-      reply.result = Json::parse(Client(socket_, kLoadTimeout).call(call.method, call.params.dump()));
-      return reply;
-    }
-    if (!client_) client_.emplace(socket_, kResponseTimeout);
-    reply.result = Json::parse(client_->call(call.method, call.params.dump()));
+    reply.result = Json::parse(send(call));
   } catch (const ClientError& error) {
     if (error.code() > 0) client_.reset();  // an error of the connection, not a response of the daemon
     reply.error = error.what();

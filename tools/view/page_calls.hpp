@@ -18,8 +18,8 @@
 namespace wrenchd {
 
 /// Calls methods of the daemon for the page's drawer, with the rights of the user of this program. Calls run
-/// one after the other, on an own thread, because loading a scene may take long; the methods do not wait. Not
-/// RT-safe: locks a mutex.
+/// one after the other, on a thread of this object, because loading a scene may take seconds; submit() does
+/// not wait. Not RT-safe: locks a mutex.
 class PageCalls {
  public:
   /// Maximum number of calls that wait; above it a call is rejected.
@@ -42,16 +42,17 @@ class PageCalls {
   /// on_reply: runs on the thread of this object, or on that of submit() for a call that is rejected there.
   PageCalls(std::string socket, std::function<void(const Reply&)> on_reply);
 
-  /// Queues a call and returns immediately. A method that no part of the page uses is rejected. Thread-safe.
+  /// Queues a call and returns immediately. Rejects a method that permits() excludes. Thread-safe.
   void submit(Call call);
 
-  /// True for the methods that the page may call: those of rendering, scene, workspace and recording. What
-  /// moves the hand or arms has its own way (PageHand, PageLease).
+  /// Returns true for the methods that the page may call: those of rendering, scene, workspace, recording
+  /// and status. PageLease arms and disarms; PageHand moves the hand.
   static bool permits(std::string_view method) noexcept;
 
  private:
   void run(const std::stop_token& stop);
   Reply execute(const Call& call);
+  std::string send(const Call& call);
 
   std::string socket_;
   std::function<void(const Reply&)> on_reply_;

@@ -16,8 +16,8 @@
 namespace wrenchd {
 
 /// Moves the hand of a simulated device for the pages that drag the tool, with the rights of the user of this
-/// program. A goal that the daemon has not taken yet is replaced by the next one. An own thread waits for the
-/// daemon; the methods do not. Not RT-safe: locks a mutex.
+/// program. A goal that the daemon has not taken yet is replaced by the next one. A thread of this object
+/// waits for the daemon; move() does not. Not RT-safe: locks a mutex.
 class PageHand {
  public:
   /// The hand returns to its path after this time without a goal.
