@@ -40,7 +40,7 @@ test(async () => {
   await page.keyboard.press("f");
   await until("Fit goes back", seen_from([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]));
 
-  // From the top, the front and the side; the tool is then near the middle of the picture.
+  // From the top, the front and the side; the tool is then in the picture.
   for (const [key, axis, sign] of [["1", 2, 1], ["2", 0, -1], ["3", 1, -1]]) {
     await page.keyboard.press(key);
     const now = await camera();
@@ -51,10 +51,15 @@ test(async () => {
     assert.ok(x > canvas.x && x < canvas.x + canvas.width && y > canvas.y && y < canvas.y + canvas.height, `key ${key}: the tool is at ${x}, ${y}`);
   }
 
-  // The scale: its length on the screen is that of two points which are so far apart beside the target.
+  // The length of the scale is the distance on the screen between two points of the world that are so far apart at the target.
   const scale = await page.evaluate(() => window.view.scale());
   const line = await page.locator("#scale-line").boundingBox();
-  assert.ok(Math.abs(line.width - scale.width_px) < 2 && line.width > 30 && line.width < 120);
+  const apart = await page.evaluate((length_m) => {  // seen along +y, +x is to the right
+    const { target } = window.view.world();
+    const [left, right] = [-0.5, 0.5].map((half) => window.view.onScreen([target[0] + half * length_m, target[1], target[2]]));
+    return right[0] - left[0];
+  }, scale.length_m);
+  assert.ok(Math.abs(line.width - apart) < 2 && line.width > 30 && line.width < 120, `${line.width} px, ${apart} px`);
   assert.match(await page.locator("#scale-text").textContent(), /^[\d.]+ (m|mm|um); force arrow [\d.]+ N$/);
 
   // The camera follows the tool of a hand that moves, at a constant distance.

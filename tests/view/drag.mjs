@@ -17,7 +17,7 @@ test(async () => {
   const eye = () => page.evaluate(() => window.view.world().eye);
   const rest = await pose();
   assert.ok(Math.abs(rest[2] - 0.065) < 1e-3);
-  // The camera may still be moving to its place when the tool is aimed at, so a miss is tried again.
+  // The mouse may miss the tool on a slow machine; then it aims again.
   const grab = (button) => until("the tool is grabbed", async () => {
     const [x, y] = await page.evaluate(() => window.view.toolOnScreen());
     await page.mouse.move(x, y);

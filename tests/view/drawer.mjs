@@ -34,7 +34,7 @@ test(async () => {
     await said(`Undone: `);
     await said(back);
   }
-  assert.equal(await page.locator("#undo").isDisabled(), true);
+  await until("all is undone", () => page.locator("#undo").isDisabled());
   assert.equal((await settings())["wrench.energy_stiffness_per_s2"], 3000);
 
   // A value that the daemon rejects changes nothing, and the page says why.
@@ -61,6 +61,7 @@ test(async () => {
   await until("the scene", async () => /staircase/.test(await text(page, "scene-now")));
   await page.locator("#undo").click();
   await until("the scene before", async () => (await text(page, "scene-now")) === before);
+  await until("all is undone", () => page.locator("#undo").isDisabled());
   await page.locator("#scene-file").fill("scenes/no_such.toml");
   await page.locator("#load").click();
   await said("no_such.toml");
@@ -91,6 +92,11 @@ test(async () => {
   await page.keyboard.press("s");
   await page.locator("#event-text").fill("stop");
   await until("the event", async () => /stop/.test(await text(page, "event-list")));
+  assert.match(await text(page, "event-list"), /then acknowledge/);
+  await page.locator("#event-text").fill("");
+  await page.locator("#event-level").selectOption("error");
+  const levels = await page.locator("#event-list li").evaluateAll((lines) => lines.map((line) => line.dataset.level));
+  assert.ok(levels.length > 0 && levels.every((level) => level === "error"), levels.join());
   await page.locator("#event-text").fill("no event has this text");
   await until("none", () => page.locator("#no-events").isVisible());
 

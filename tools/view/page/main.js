@@ -3,10 +3,11 @@
 import { Connection } from "./connection.js";
 import { ToolDrag } from "./drag.js";
 import { Drawer } from "./drawer.js";
+import { $ } from "./elements.js";
+import { showMeasure } from "./measure.js";
 import { History, Plots } from "./plots.js";
 import { World } from "./world.js";
 
-const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
 const PLOT_INTERVAL_MS = 50;
 const HEARTBEAT_INTERVAL_MS = 100;
@@ -171,26 +172,6 @@ function showTriangleCount() {
   if (sceneTriangles === 0) return;
   const shown = world.triangles();
   set("note", shown < sceneTriangles ? `${sceneTriangles.toLocaleString("en")} triangles, drawn with ${shown.toLocaleString("en")}` : "");
-}
-
-/** Draws the axes of the world as the camera sees them, and a length with the force whose arrow has this length. */
-function showMeasure() {
-  const { right, up, forward } = world.screenAxes();
-  ["x", "y", "z"].forEach((name, i) => {
-    const axis = document.querySelector(`#triad [data-axis="${name}"]`);
-    const [line, letter] = axis.children;
-    const [x, y] = [right[i], -up[i]].map((part) => part.toFixed(3));
-    line.setAttribute("x2", 20 * x);
-    line.setAttribute("y2", 20 * y);
-    letter.setAttribute("x", 27 * x);
-    letter.setAttribute("y", 27 * y);
-    letter.style.opacity = Math.hypot(x, y) < 0.15 ? 0 : 1;  // an axis along the line of sight
-    axis.style.opacity = forward[i] > 0.3 ? 0.6 : 1;
-  });
-  const { length_m, width_px, force_N } = world.scale();
-  const length = length_m >= 1 ? `${length_m} m` : length_m >= 1e-3 ? `${Number((1e3 * length_m).toPrecision(1))} mm` : `${Number((1e6 * length_m).toPrecision(1))} um`;
-  set("scale-text", `${length}; force arrow ${Number(force_N.toPrecision(2))} N`);
-  $("scale-line").style.width = `${width_px.toFixed(0)}px`;
 }
 
 let toastEnds = 0;
@@ -438,7 +419,7 @@ function draw(now) {
   if (frame) showFrame(frame);
   showButtons();
   world.draw(now);
-  showMeasure();
+  showMeasure(world);
   showTriangleCount();
   if (now - plotted > PLOT_INTERVAL_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
@@ -464,6 +445,7 @@ window.view = {
   world: () => world.inspect(),
   scale: () => world.scale(),
   dragging: () => Boolean(toolDrag.drag),
+  onScreen: (point) => world.onScreen(point),
   toolOnScreen: () => world.toolOnScreen(),
   history: () => history,
   times: () => times,

@@ -31,7 +31,10 @@ const MOST_MS = 150;  // clamps the first frames, which compile shaders
 
 const UP = new THREE.Vector3(0, 1, 0);
 
-/** Directions from the scene to the camera, in the world. A camera exactly above would have no upward direction: x is up there. */
+/**
+ * Directions from the scene to the camera, in the world. "top" is tilted toward -x, because a camera exactly above has no upward
+ * direction; +x is then up on the screen.
+ */
 const VIEWPOINTS = { top: [-1e-4, 0, 1], front: [-1, 0, 0], side: [0, -1, 0] };
 
 /** An arrow of any length and thickness, along +Y before its rotation. */
@@ -315,7 +318,7 @@ export class World {
     this.changed = true;
   }
 
-  /** Moves the camera with the tool, or lets it rest. */
+  /** on: from now on the camera moves with the tool; otherwise it rests. */
   follow(on) {
     this.followed = on && this.ghost ? this.ghost.position.clone() : null;
   }
@@ -359,12 +362,16 @@ export class World {
     return (2 * distance_m * Math.tan((this.camera.fov * Math.PI) / 360)) / this.canvas.clientHeight;
   }
 
-  /** Returns the point of the screen at which the tool's centre of mass is drawn. */
-  toolOnScreen() {
+  /** Returns the point of the screen at which a point of the world is drawn. */
+  onScreen(point) {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     this.camera.updateMatrixWorld();
-    const at = this.tool.position.clone().project(this.camera);
+    const at = new THREE.Vector3(...point).project(this.camera);
     return [left + (width * (at.x + 1)) / 2, top + (height * (1 - at.y)) / 2];
+  }
+
+  toolOnScreen() {
+    return this.onScreen(this.tool.position.toArray());
   }
 
   resize() {
