@@ -33,7 +33,11 @@ PageCalls::PageCalls(std::string socket, std::function<void(const Reply&)> on_re
 void PageCalls::submit(Call call) {
   const std::uint64_t page = call.page, id = call.id;
   if (!permits(call.method))
-    return on_reply_({page, id, {}, "The page may not call '" + call.method + "'; use wrenchctl call."});
+    return on_reply_(
+        {page,
+         id,
+         {},
+         "The page may not call '" + call.method + "'; connect a client to the control socket."});
   {
     const std::scoped_lock lock(mutex_);
     if (pending_.size() < kMaxPending) {
