@@ -755,7 +755,7 @@ std::string without_progress(const std::string& err) {
   return rest;
 }
 
-TEST_CASE("wrenchctl check accepts every file that is shipped") {
+TEST_CASE("wrenchctl check accepts every file that is shipped", "[long]") {
   int count = 0;
   for (const fs::path& file : fs::recursive_directory_iterator(test::source_path("config"))) {
     if (file.extension() != ".toml") continue;
@@ -889,7 +889,7 @@ TEST_CASE("wrenchctl mesh describes a mesh") {
   CHECK(overflow.err.find(vast.string() + ": has no usable volume at scale 1") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl mesh accepts the meshes that it generates") {
+TEST_CASE("wrenchctl mesh accepts the meshes that it generates", "[long]") {
   const TemporaryDirectory dir;
   for (const char* kind :
        {"cube", "plate", "table", "sphere", "bumpy", "boulder", "peg", "hole", "bolt", "nut", "gear"}) {

@@ -527,7 +527,7 @@ std::string open_mesh() {
 }
 
 TEST_CASE("a thousand random changes in contact, half of them invalid, cause no jump and no torn rendering",
-          "[reconfigurator][reload]") {
+          "[reconfigurator][reload][long]") {
   // The energy law generates no energy, also when the tool rotates in contact.
   Configured c;
   c.write("[wrench]\nlaw = \"energy\"\n");
