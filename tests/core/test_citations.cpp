@@ -204,7 +204,7 @@ class CitationCheck {
     if (numbers.empty()) report(at, "write Eq. (8) for an equation of the paper");
     for (const std::string& n : numbers)
       if (!method().of_paper.contains(n))
-        report(at, "core/METHOD.md, section 16, does not list Eq. (" + n + ")");
+        report(at, "core/METHOD.md, section 17, does not list Eq. (" + n + ")");
   }
 
   void check_section(std::size_t at) {
@@ -286,7 +286,7 @@ TEST_CASE("valid citations pass, invalid citations are reported", "[citations]")
     CHECK(citation_errors(right).empty());
   }
   for (const char* wrong :
-       {"METHOD (999)", "METHOD (9), (999)", "METHOD (95)-(99)", "core/METHOD.md, section 99",
+       {"METHOD (999)", "METHOD (9), (999)", "METHOD (95)-(199)", "core/METHOD.md, section 99",
         "core/METHOD.md, section 3.99", "see core/METHOD.md,\n/// section 99", "section 3 of the method",
         "(section 2.4)", "paper, section 7", "(Eq. 8)", "Eq. (99)", "Eqs. (53)-(55)"}) {
     INFO(wrong);

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+
+#include "core/cone_projection.hpp"
+#include "core/contact.hpp"
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// A contact between two bodies of a BodyWorld, or between a body and the fixed obstacles. Body a has the
+/// part of the tool in `contact`, body b that of the obstacle: points and directions "in W" of the contact
+/// are in the frame of b if b is a body.
+struct BodyContact {
+  static constexpr std::size_t kFixed = FrictionCone::kFixed;
+
+  std::size_t a = 0, b = kFixed;  ///< numbers of the bodies
+  Contact contact;
+  double mu = 0.0;  ///< coefficient of friction
+  /// Motion of the obstacle in this tick: X_WO(end) = obstacle_motion * X_WO(start). Identity for a body b.
+  Pose obstacle_motion;
+  Vector3d force_W_N = Vector3d::Zero();  ///< force on body a, in the last step
+  double slip_m = 0.0;                    ///< length of the slip in the last step
+  bool stays = false;                     ///< is not dropped in this step
+};
+
+/// The gap [m], the normal and the contact point in W of a contact. X_WA, X_WB: poses of its bodies; X_WB is
+/// the identity if b is fixed.
+struct ContactGeometry {
+  double gap_m;
+  Vector3d n_W;
+  Vector3d point_W_m;
+};
+
+/// RT-safe.
+inline ContactGeometry geometry_of(const BodyContact& c, const Pose& X_WA, const Pose& X_WB) noexcept {
+  if (c.b == BodyContact::kFixed)
+    return {gap_m(c.contact, X_WA), normal_W(c.contact, X_WA), contact_point_W(c.contact, X_WA)};
+  const Pose X_BA = inverse(X_WB) * X_WA;
+  return {gap_m(c.contact, X_BA), X_WB.rotation * normal_W(c.contact, X_BA),
+          X_WB * contact_point_W(c.contact, X_BA)};
+}
+
+}  // namespace wrenchd

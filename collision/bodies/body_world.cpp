@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/bodies/body_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <Eigen/Cholesky>
+
+#include "core/metric.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Newton steps of an island: at most this number with the slip of the last iterate, METHOD (106), then at
+/// most this number with the relaxed cone.
+constexpr int kNewtonSteps = 16;
+/// A solve ends if no point moved farther than this in a Newton step [m].
+constexpr double kConverged_m = 1e-12;
+/// Accepted violation of a cone in a Newton step [m].
+constexpr double kTolerance_m = 1e-13;
+/// Least gap of an admissible pose and of a contact that is held at less than the clearance, and the largest
+/// gap of a contact that touches, as multiples of the clearance.
+constexpr double kMinClearance = 0.2;
+constexpr double kTouch = 1.1;
+/// A path that is too long falls to this fraction.
+constexpr double kShorter = 0.25;
+constexpr double kMinFraction = 1.0 / 256.0;
+
+/// The pose at a fraction of the straight path between two poses.
+Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
+  return {from.rotation.slerp(fraction, to.rotation),
+          from.translation_m + fraction * (to.translation_m - from.translation_m)};
+}
+
+std::shared_ptr<const MeshBvh> bvh_of(const ToolBody& body) {
+  return std::make_shared<const MeshBvh>(body.mesh, body.kind);
+}
+
+}  // namespace
+
+BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Settings& settings)
+    : settings_(settings), cones_(bodies.size() + 1, kMaxContacts) {
+  if (bodies.size() + 1 > kMaxBodies) throw std::invalid_argument("too many bodies: at most 32");
+  bodies_.resize(bodies.size() + 1);
+  bodies_[0].name = "tool";
+  bodies_[0].M = scene.tool().solid.inertia;
+  bodies_[0].friction = settings.tool_friction;
+  bodies_[0].radius_m = scene.tool_radius_m();
+  std::vector<std::shared_ptr<const MeshBvh>> meshes(bodies_.size());
+  meshes[0] = std::make_shared<const MeshBvh>(scene.tool().mesh, scene.tool().kind);
+  for (std::size_t i = 1; i < bodies_.size(); ++i) {
+    FreeBody& given = bodies[i - 1];
+    meshes[i] = bvh_of(given.body);
+    Body& body = bodies_[i];
+    body.name = given.name;
+    body.M = given.body.solid.inertia;
+    body.forces = {settings.gravity_W_m_per_s2, given.linear_damping_per_s, given.angular_damping_per_s};
+    body.friction = given.friction;
+    body.motion = given.motion;
+    body.radius_m = meshes[i]->surface.radius_m();
+    for (const Vector3d& p : given.body.hull.vertices_T_m) body.radius_m = std::max(body.radius_m, p.norm());
+  }
+  const auto body_of = [&](std::size_t i) -> const ToolBody& {
+    return i == 0 ? scene.tool() : bodies[i - 1].body;
+  };
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (!scene.half_spaces().empty() || !scene.meshes().empty())
+      pairs_.push_back(std::make_unique<BodyPair>(
+          i, BodyPair::kFixed, Scene(body_of(i), scene.half_spaces(), {}, scene.meshes(), meshes[i])));
+    for (std::size_t j = i + 1; j < bodies_.size(); ++j) {
+      std::vector<MeshObstacle> other;
+      other.emplace_back(bodies_[j].name, meshes[j], Pose{});
+      pairs_.push_back(
+          std::make_unique<BodyPair>(i, j, Scene(body_of(i), {}, {}, std::move(other), meshes[i])));
+    }
+  }
+  contacts_.reserve(kMaxContacts);
+  dropped_.reserve(kMaxContacts);
+  island_contacts_.reserve(kMaxContacts);
+  island_bodies_.reserve(bodies_.size());
+}
+
+void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
+  bodies_[body].motion = motion;
+  std::erase_if(contacts_, [&](const BodyContact& c) { return c.a == body || c.b == body; });
+  for (const auto& pair : pairs_)
+    if (pair->a() == body || pair->b() == body) pair->reset();
+}
+
+double BodyWorld::energy_J() const noexcept {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < bodies_.size(); ++i)
+    sum += kinetic_energy_J(bodies_[i].M, bodies_[i].motion) -
+           bodies_[i].M.mass_kg * settings_.gravity_W_m_per_s2.dot(bodies_[i].motion.X_WB.translation_m);
+  return sum;
+}
+
+BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s) noexcept {
+  begin(hand, dt_s);
+  bool clean = false;
+  for (rounds_ = 0; rounds_ < settings_.rounds && !clean; ++rounds_) {
+    solve_islands(dt_s);
+    clean = sweep_pairs(dt_s);
+    if (clean) clean = !drop_separated();
+  }
+  if (!clean) hold_all(dt_s);
+  apply_impulses();
+  if (clean) time_s_ += dt_s;
+  prefetch(dt_s);
+  return clean ? Status::converged : Status::budget_spent;
+}
+
+/// Sets the goals of all bodies and moves the contacts with the obstacles that move.
+void BodyWorld::begin(const std::optional<Hand>& hand, double dt_s) noexcept {
+  budget_ = {settings_.node_visits};
+  last_change_m_ = 0.0;
+  for (Body& body : bodies_) {
+    body.touches = body.solved = false;
+    body.fraction = 1.0;
+    body.weight_per_s2 = 1.0;
+    body.X_WQ = body.X_WQ_swept = body.motion.X_WB;
+  }
+  Body& tool = bodies_[0];
+  tool.weight_per_s2 = hand ? hand->stiffness_per_s2 : 0.0;
+  if (hand) X_WP_ = hand->X_WP;
+  if (!hand) std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
+  dropped_.clear();
+  for (BodyContact& contact : contacts_) {
+    contact.stays = false;
+    bodies_[contact.a].touches = true;
+    if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
+  }
+  move_contacts(time_s_, time_s_ + dt_s);
+  for (Body& body : bodies_) set_goal(body, dt_s);
+}
+
+/// A body without contact ends where its exact motion ends. One with contact moves at the velocity that it
+/// has at the end, METHOD (102). In a shortened step less time passes for the body.
+void BodyWorld::set_goal(Body& body, double dt_s) noexcept {
+  if (&body == &bodies_[0]) {
+    body.free = body.motion;
+    body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_WP_, body.fraction) : X_WP_;
+  } else {
+    body.step_s = body.fraction * dt_s;
+    body.weight_per_s2 = 1.0 / (body.step_s * body.step_s);
+    body.free = moved_freely(body.M, body.motion, body.forces, body.step_s);
+    body.X_goal = body.free.X_WB;
+    if (body.touches) {
+      const Pose& start = body.motion.X_WB;
+      const Vector3d omega_W = angular_velocity_W(body.M, body.free);
+      body.X_goal = {rotation_from(body.step_s * omega_W) * start.rotation,
+                     start.translation_m + body.step_s * body.free.velocity_W_m_per_s};
+    }
+  }
+  if (!body.touches) body.X_WQ = body.X_goal;
+}
+
+void BodyWorld::move_contacts(double from_s, double to_s) noexcept {
+  for (const auto& pair : pairs_) {
+    if (!pair->is_fixed() || !pair->scene().has_moving_obstacles()) continue;
+    for (BodyContact& c : contacts_) {
+      if (c.a != pair->a() || c.b != BodyContact::kFixed) continue;
+      c.obstacle_motion = pair->scene().obstacle_displacement(c.contact.obstacle, from_s, to_s);
+      c.contact = moved(c.contact, c.obstacle_motion);
+    }
+  }
+}
+
+std::size_t BodyWorld::root_of(std::size_t body) noexcept {
+  while (bodies_[body].island != body) body = bodies_[body].island = bodies_[bodies_[body].island].island;
+  return body;
+}
+
+/// Bodies that a chain of contacts connects are one island.
+void BodyWorld::find_islands() noexcept {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = i;
+  for (const BodyContact& c : contacts_)
+    if (c.b != BodyContact::kFixed) bodies_[root_of(c.b)].island = root_of(c.a);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = root_of(i);
+}
+
+/// Solves the islands with a body whose contacts changed.
+void BodyWorld::solve_islands(double dt_s) noexcept {
+  find_islands();
+  for (std::size_t island = 0; island < bodies_.size(); ++island) {
+    if (bodies_[island].island != island) continue;
+    bool solved = true;
+    double fraction = 1.0;  // the same time passes for all bodies of an island
+    for (const Body& body : bodies_) {
+      if (body.island != island) continue;
+      solved = solved && body.solved;
+      fraction = std::min(fraction, body.fraction);
+    }
+    if (solved) continue;
+    for (Body& body : bodies_) {
+      if (body.island != island || body.weight_per_s2 == 0.0) continue;
+      body.fraction = fraction;
+      set_goal(body, dt_s);
+    }
+    solve_island(island);
+  }
+}
+
+void BodyWorld::solve_island(std::size_t island) noexcept {
+  island_bodies_.clear();
+  island_contacts_.clear();
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (bodies_[i].island != island || bodies_[i].weight_per_s2 == 0.0) continue;
+    bodies_[i].block = island_bodies_.size();
+    bodies_[i].solved = true;
+    island_bodies_.push_back(i);
+  }
+  for (std::size_t k = 0; k < contacts_.size(); ++k)
+    if (bodies_[contacts_[k].a].island == island) island_contacts_.push_back(k);
+  if (island_contacts_.empty()) {
+    for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].X_goal;
+    return;
+  }
+  for (const Slip slip : {Slip::last_iterate, Slip::none}) {
+    for (int k = 0; k < kNewtonSteps; ++k) {
+      const bool first = k == 0 && slip == Slip::last_iterate;
+      if (newton_step(first ? Slip::last_step : slip, k > 0) && k > 0) break;
+    }
+    if (admissible(island)) return;
+  }
+}
+
+ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
+  return geometry_of(contact, bodies_[contact.a].X_WQ,
+                     contact.b == BodyContact::kFixed ? Pose{} : bodies_[contact.b].X_WQ);
+}
+
+/// The pose at which a contact acts on a body: half way for a free body, so that the contact does the work of
+/// its gap, METHOD (103); q for the tool, whose wrench is the gradient at q.
+Pose BodyWorld::acting_pose(std::size_t body) const noexcept {
+  const Body& one = bodies_[body];
+  return body == 0 ? one.X_WQ : between(one.motion.X_WB, one.X_WQ, 0.5);
+}
+
+ContactGeometry BodyWorld::acting_geometry(const BodyContact& contact) const noexcept {
+  return geometry_of(contact, acting_pose(contact.a),
+                     contact.b == BodyContact::kFixed ? Pose{} : acting_pose(contact.b));
+}
+
+/// True if the present poses of an island keep all its known contacts open.
+bool BodyWorld::admissible(std::size_t island) const noexcept {
+  return std::all_of(contacts_.begin(), contacts_.end(), [&](const BodyContact& c) {
+    return bodies_[c.a].island != island || geometry(c).gap_m >= kMinClearance * kClearance_m;
+  });
+}
+
+/// Displacement of the point of body a against that of body b (or of the obstacle) in this step, along the
+/// surface: METHOD (104). at: the acting geometry.
+Vector3d BodyWorld::slip_m(const BodyContact& c, const ContactGeometry& at) const noexcept {
+  const auto displacement = [&](std::size_t body) {
+    const Vector3d p_B = inverse(acting_pose(body)) * at.point_W_m;
+    return Vector3d(bodies_[body].X_WQ * p_B - bodies_[body].motion.X_WB * p_B);
+  };
+  const Vector3d other = c.b == BodyContact::kFixed
+                             ? Vector3d(at.point_W_m - inverse(c.obstacle_motion) * at.point_W_m)
+                             : displacement(c.b);
+  const Vector3d moved = displacement(c.a) - other;
+  return moved - at.n_W.dot(moved) * at.n_W;
+}
+
+/// METHOD (105). slip: where the length of the slip in (106) comes from; none keeps every gap open.
+FrictionCone BodyWorld::cone_of(const BodyContact& c, Slip slip) const noexcept {
+  const ContactGeometry at = acting_geometry(c);
+  FrictionCone cone;
+  cone.n = at.n_W;
+  cone.mu = c.mu;
+  cone.h_m = geometry(c).gap_m - kClearance_m;
+  if (c.mu > 0.0) {
+    cone.slip_m = slip_m(c, at);
+    if (slip == Slip::last_step) cone.h_m += c.mu * c.slip_m;
+    if (slip == Slip::last_iterate) cone.h_m += c.mu * cone.slip_m.norm();
+  }
+  const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
+    const Body& body = bodies_[i];
+    const Pose X_WB = acting_pose(i);
+    block = body.block;
+    D.leftCols<3>() = (sign / std::sqrt(body.weight_per_s2 * body.M.mass_kg)) * Matrix3d::Identity();
+    // -hat(lever) R U^-1: the upper triangle U is inverted from the right
+    const Matrix3d turning =
+        -sign * hat(at.point_W_m - X_WB.translation_m) * X_WB.rotation.toRotationMatrix();
+    D.rightCols<3>() =
+        body.root.transpose().triangularView<Eigen::Lower>().solve(turning.transpose()).transpose();
+  };
+  set_block(c.a, 1.0, cone.a, cone.D_a);
+  if (c.b != BodyContact::kFixed) set_block(c.b, -1.0, cone.b, cone.D_b);
+  return cone;
+}
+
+/// One Newton step of an island, METHOD (99), (105). Returns true if it moved no point.
+bool BodyWorld::newton_step(Slip slip, bool starts_with_last) noexcept {
+  cones_.clear(island_bodies_.size());
+  for (const std::size_t i : island_bodies_) {
+    Body& body = bodies_[i];
+    Quaterniond E = body.X_goal.rotation.conjugate() * body.X_WQ.rotation;
+    if (E.w() < 0.0) E.coeffs() = -E.coeffs();
+    const Vector3d v = E.vec(), Hv = body.M.H_kg_m2 * v;
+    // METHOD (14), (15) with the factor kappa / 2
+    const Matrix3d G = 0.5 * (E.w() * Matrix3d::Identity() + hat(v));
+    const Matrix3d metric = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
+    body.root = metric.llt().matrixU();
+    const Vector3d torque = 2.0 * body.weight_per_s2 * (E.w() * Hv - v.cross(Hv));
+    auto z0 = cones_.z0(body.block);
+    z0.head<3>() = std::sqrt(body.weight_per_s2 * body.M.mass_kg) *
+                   (body.X_goal.translation_m - body.X_WQ.translation_m);
+    z0.tail<3>() = -body.root.transpose().triangularView<Eigen::Lower>().solve(torque);
+  }
+  for (const std::size_t k : island_contacts_) cones_.add(cone_of(contacts_[k], slip));
+  cones_.solve(kTolerance_m, starts_with_last);
+  double change_m = 0.0;
+  for (const std::size_t i : island_bodies_) {
+    Body& body = bodies_[i];
+    const Vector6d z = cones_.z(body.block);
+    const Vector3d shift = z.head<3>() / std::sqrt(body.weight_per_s2 * body.M.mass_kg);
+    const Vector3d turn = body.root.triangularView<Eigen::Upper>().solve(z.tail<3>());
+    body.X_WQ.translation_m += shift;
+    body.X_WQ.rotation = (body.X_WQ.rotation * rotation_from(turn)).normalized();
+    change_m = std::max(change_m, shift.norm() + body.radius_m * turn.norm());
+  }
+  for (std::size_t k = 0; k < island_contacts_.size(); ++k) {
+    BodyContact& contact = contacts_[island_contacts_[k]];
+    contact.force_W_N = cones_.force(k);
+  }
+  last_change_m_ = change_m;
+  return change_m <= kConverged_m;
+}
+
+BodyPath BodyWorld::path_of(std::size_t body) const noexcept {
+  if (body == BodyContact::kFixed) return {};
+  return {bodies_[body].motion.X_WB, bodies_[body].X_WQ};
+}
+
+/// Sweeps the pairs with a body whose end pose changed since the last sweeps. Returns true if all paths are
+/// free.
+bool BodyWorld::sweep_pairs(double dt_s) noexcept {
+  bool free = true;
+  for (const auto& pair : pairs_) {
+    const auto changed = [&](std::size_t i) {
+      return i != BodyContact::kFixed && !same_bits(bodies_[i].X_WQ, bodies_[i].X_WQ_swept);
+    };
+    const auto takes_part = [&](std::size_t i) {
+      return i == BodyContact::kFixed || bodies_[i].weight_per_s2 > 0.0;
+    };
+    if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
+    const bool moves = pair->is_fixed() && pair->scene().has_moving_obstacles();
+    if (!moves && !changed(pair->a()) && !changed(pair->b())) continue;
+    if (!sweep_pair(*pair, dt_s)) free = false;
+  }
+  if (free)
+    for (Body& body : bodies_) body.X_WQ_swept = body.X_WQ;
+  return free;
+}
+
+bool BodyWorld::sweep_pair(BodyPair& pair, double dt_s) noexcept {
+  bool free = true;
+  if (pair.is_fixed() && !pair.scene().half_spaces().empty()) {
+    ContactSet met;
+    for (const BodyContact& c : contacts_)
+      if (c.a == pair.a() && c.b == BodyContact::kFixed) met.add(c.contact);
+    const std::size_t known = met.size();
+    pair.add_half_spaces(bodies_[pair.a()].X_WQ, 0.5 * kClearance_m, met);
+    for (std::size_t k = known; k < met.size(); ++k) free = !add_contact(pair, met[k]) && free;
+  }
+  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
+  if (!pair.is_near(path_a, path_b)) return free;
+  const SweepQuery::SweepResult found =
+      pair.sweep(path_a, path_b, kClearance_m, budget_, {time_s_, time_s_ + dt_s});
+  bool found_new = false;
+  for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
+  if (found_new) return false;
+  if (found.complete && !found.overlaps && held_open(pair, found)) return free;
+  shorten(pair);
+  return false;
+}
+
+/// True if the known contacts keep open what a sweep found: a gap just below the clearance is no crossing.
+bool BodyWorld::held_open(const BodyPair& pair, const SweepQuery::SweepResult& found) const noexcept {
+  return std::all_of(found.contacts.begin(), found.contacts.end(), [&](const Contact& contact) {
+    return std::any_of(contacts_.begin(), contacts_.end(), [&](const BodyContact& known) {
+      return known.a == pair.a() && known.b == pair.b() && same_features(known.contact, contact) &&
+             geometry(known).gap_m >= kMinClearance * kClearance_m;
+    });
+  });
+}
+
+void BodyWorld::unsolve(std::size_t body) noexcept {
+  if (body == BodyContact::kFixed) return;
+  bodies_[body].solved = false;
+  bodies_[body].touches = true;
+}
+
+/// Lets the bodies of a pair try a shorter way.
+void BodyWorld::shorten(const BodyPair& pair) noexcept {
+  for (const std::size_t i : {pair.a(), pair.b()}) {
+    if (i == BodyContact::kFixed) continue;
+    const std::size_t island = bodies_[i].island;
+    for (Body& body : bodies_) {
+      if (body.island != island) continue;
+      body.fraction = body.fraction > kMinFraction ? kShorter * body.fraction : 0.0;
+      body.solved = false;
+    }
+  }
+}
+
+/// Returns false if the contact is known or there is no room. A contact with less room than the clearance at
+/// the start is held at that gap, so that the start remains admissible.
+bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexcept {
+  if (contacts_.size() == kMaxContacts) return false;
+  BodyContact added;
+  added.a = pair.a();
+  added.b = pair.b();
+  added.contact = contact;
+  for (const BodyContact& known : contacts_)
+    if (known.a == added.a && known.b == added.b && same_features(known.contact, contact)) return false;
+  const Body& a = bodies_[added.a];
+  added.mu = pair.is_fixed() ? a.friction : std::sqrt(a.friction * bodies_[added.b].friction);
+  const bool moves = pair.is_fixed() && pair.scene().has_moving_obstacles();
+  const double gap =
+      geometry_of(added, a.motion.X_WB, pair.is_fixed() ? Pose{} : bodies_[added.b].motion.X_WB).gap_m;
+  if (!moves && gap < kClearance_m) {
+    const double gap_reduction_m = kClearance_m - std::max(gap, kMinClearance * kClearance_m);
+    const Pose X_BA = pair.is_fixed() ? a.motion.X_WB : inverse(bodies_[added.b].motion.X_WB) * a.motion.X_WB;
+    added.contact.p_WCb_m -= gap_reduction_m * normal_W(contact, X_BA);
+    added.contact.offset_m -= gap_reduction_m;
+  }
+  added.stays = std::any_of(dropped_.begin(), dropped_.end(), [&](const BodyContact& dropped) {
+    return dropped.a == added.a && dropped.b == added.b && same_features(dropped.contact, contact);
+  });
+  contacts_.push_back(added);
+  unsolve(added.a);
+  unsolve(added.b);
+  return true;
+}
+
+/// Drops contacts that do not touch, and contacts whose features do not face each other. Returns true if one
+/// of these carried: the poses are then solved again. If a sweep then finds the same contact once more, as at
+/// the border of a face, the contact stays until the next step.
+bool BodyWorld::drop_separated() noexcept {
+  bool carried = false;
+  std::erase_if(contacts_, [&](const BodyContact& c) {
+    const auto pair = std::find_if(pairs_.begin(), pairs_.end(),
+                                   [&](const auto& p) { return p->a() == c.a && p->b() == c.b; });
+    const bool open = geometry(c).gap_m > kTouch * kClearance_m;
+    const bool loaded = c.force_W_N.squaredNorm() > 0.0;
+    if (c.stays || (open ? loaded : (*pair)->touches(c.contact))) return false;
+    if (!loaded) return true;
+    carried = true;
+    if (dropped_.size() < dropped_.capacity()) dropped_.push_back(c);
+    unsolve(c.a);
+    unsolve(c.b);
+    return true;
+  });
+  return carried;
+}
+
+/// Nothing moves, bodies and obstacles: the poses at the start are admissible together.
+void BodyWorld::hold_all(double dt_s) noexcept {
+  for (Body& body : bodies_) {
+    body.X_WQ = body.X_goal = body.motion.X_WB;
+    body.free = body.motion;
+    body.free.velocity_W_m_per_s.setZero();
+    body.free.spin_W.setZero();
+  }
+  move_contacts(time_s_ + dt_s, time_s_);
+  for (BodyContact& contact : contacts_) {
+    contact.force_W_N.setZero();
+    contact.obstacle_motion = {};
+  }
+}
+
+/// Applies the impulses of all contacts to the motions without contact, METHOD (109).
+void BodyWorld::apply_impulses() noexcept {
+  for (BodyContact& c : contacts_) {
+    const Vector3d impulse = bodies_[c.a == 0 ? c.b : c.a].step_s * c.force_W_N;
+    const ContactGeometry at = acting_geometry(c);
+    const Vector3d point = at.point_W_m;
+    c.slip_m = slip_m(c, at).norm();
+    const auto push = [&](std::size_t i, double sign) {
+      if (i == BodyContact::kFixed || i == 0) return;
+      Body& body = bodies_[i];
+      body.free.velocity_W_m_per_s += sign / body.M.mass_kg * impulse;
+      body.free.spin_W += sign * (point - acting_pose(i).translation_m).cross(impulse);
+    };
+    push(c.a, 1.0);
+    push(c.b, -1.0);
+  }
+  for (Body& body : bodies_) {
+    body.free.X_WB = body.X_WQ;
+    body.motion = body.free;
+  }
+}
+
+/// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.
+void BodyWorld::prefetch(double dt_s) noexcept {
+  for (const auto& pair : pairs_) {
+    const auto next = [&](std::size_t i) {
+      if (i == BodyContact::kFixed) return BodyPath{};
+      const BodyMotion& motion = bodies_[i].motion;
+      return BodyPath{motion.X_WB, i == 0 ? bodies_[0].X_goal
+                                          : moved_freely(bodies_[i].M, motion, bodies_[i].forces, dt_s).X_WB};
+    };
+    const BodyPath path_a = next(pair->a()), path_b = next(pair->b());
+    if (pair->is_near(path_a, path_b)) pair->prefetch(path_a, path_b, time_s_, budget_);
+  }
+}
+
+}  // namespace wrenchd

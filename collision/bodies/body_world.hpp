@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "collision/bodies/body_contact.hpp"
+#include "collision/bodies/body_pair.hpp"
+#include "collision/scene.hpp"
+#include "collision/tool_body.hpp"
+#include "core/cone_projection.hpp"
+#include "core/free_motion.hpp"
+
+namespace wrenchd {
+
+/// A rigid body that moves by itself. B: body frame, parallel to the frame of the mesh file, with its origin
+/// at the centre of mass.
+struct FreeBody {
+  std::string name;
+  ToolBody body;      ///< its mesh and inertia
+  BodyMotion motion;  ///< state at the start
+  double friction = 0.5;
+  double linear_damping_per_s = 0.0;
+  double angular_damping_per_s = 0.0;
+};
+
+/// The tool, free bodies and fixed obstacles as one system: one step is the projection of core/METHOD.md,
+/// section 15, of the hand's pose and of the motions without contact onto the poses in which nothing
+/// overlaps.
+///
+/// Body 0 is the tool. It takes part in steps with a hand; free bodies are 1, 2, ... No step ends with an
+/// overlap, and no body passes through another. If the work limit of a step is reached, bodies stay where
+/// they were.
+///
+/// The constructor allocates all memory. One object serves one thread.
+class BodyWorld {
+ public:
+  static constexpr std::size_t kMaxBodies = 33;  ///< with the tool
+  static constexpr std::size_t kMaxContacts = 1024;
+  static constexpr double kClearance_m = 1e-9;  ///< gap at which contacts are held [m]
+
+  struct Settings {
+    Vector3d gravity_W_m_per_s2 = {0.0, 0.0, -9.81};
+    double tool_friction = 0.0;
+    std::uint32_t rounds = 24;            ///< rounds of solving and sweeping per step
+    std::uint32_t node_visits = 400'000;  ///< work limit of all sweeps of a step [node visits]
+  };
+  /// What the hand asks for: the pose that it commands and the stiffness k of the energy law.
+  struct Hand {
+    Pose X_WP;
+    double stiffness_per_s2 = 1.0;
+  };
+  enum class Status : std::uint8_t {
+    converged,
+    budget_spent,  ///< admissible, but some bodies did not move as far as they would
+  };
+
+  /// The scene gives the tool and the fixed obstacles, and must outlive this object; it has no contacts by
+  /// planes of convex bodies. Throws std::invalid_argument if there are too many bodies. Not RT-safe:
+  /// allocates.
+  BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Settings& settings);
+
+  /// Places a body. Its pose must be admissible. RT-safe.
+  void place(std::size_t body, const BodyMotion& motion) noexcept;
+
+  /// Moves all bodies for dt_s [s]. Without a hand the tool takes no part. RT-safe.
+  Status step(const std::optional<Hand>& hand, double dt_s) noexcept;
+
+  std::size_t body_count() const noexcept { return bodies_.size(); }  ///< with the tool
+  const BodyMotion& motion(std::size_t body) const noexcept { return bodies_[body].motion; }
+  const Inertia& inertia(std::size_t body) const noexcept { return bodies_[body].M; }
+  const std::string& name(std::size_t body) const noexcept { return bodies_[body].name; }
+  /// The contacts that touch after the last step, with their forces.
+  std::span<const BodyContact> contacts() const noexcept { return contacts_; }
+  /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
+  double time_s() const noexcept { return time_s_; }
+  /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
+  double last_change_m() const noexcept { return last_change_m_; }
+  std::uint32_t rounds() const noexcept { return rounds_; }  ///< of the last step
+  std::uint32_t node_visits() const noexcept { return settings_.node_visits - budget_.remaining; }
+  /// Kinetic and potential energy of the free bodies [J]; the height of the world's origin has none. RT-safe.
+  double energy_J() const noexcept;
+
+ private:
+  struct Body {
+    std::string name;
+    Inertia M;
+    FreeForces forces;
+    double friction = 0.0;
+    double radius_m = 0.0;
+    BodyMotion motion;                     ///< at the end of the last step
+    BodyMotion free;                       ///< without contact, at the end of this step
+    Pose X_goal;                           ///< p of the projection
+    Pose X_WQ;                             ///< q
+    Pose X_WQ_swept;                       ///< q of the last sweeps
+    double weight_per_s2 = 0.0;            ///< kappa, 0: takes no part
+    double fraction = 1.0;                 ///< part of the step that the body tries
+    double step_s = 0.0;                   ///< time that passes for the body [s]
+    std::size_t island = 0;                ///< number of the body that represents its island
+    bool touches = false;                  ///< has a contact
+    bool solved = false;                   ///< q is the answer for the present contacts
+    std::size_t block = 0;                 ///< number of the body in the problem of its island
+    Matrix3d root = Matrix3d::Identity();  ///< root of the rotational part of the metric
+  };
+
+  enum class Slip : std::uint8_t { none, last_step, last_iterate };
+
+  void begin(const std::optional<Hand>& hand, double dt_s) noexcept;
+  void set_goal(Body& body, double dt_s) noexcept;
+  void move_contacts(double from_s, double to_s) noexcept;
+  void find_islands() noexcept;
+  std::size_t root_of(std::size_t body) noexcept;
+  void solve_islands(double dt_s) noexcept;
+  void solve_island(std::size_t island) noexcept;
+  bool newton_step(Slip slip, bool starts_with_last) noexcept;
+  FrictionCone cone_of(const BodyContact& contact, Slip slip) const noexcept;
+  Vector3d slip_m(const BodyContact& contact, const ContactGeometry& at) const noexcept;
+  ContactGeometry geometry(const BodyContact& contact) const noexcept;
+  Pose acting_pose(std::size_t body) const noexcept;
+  ContactGeometry acting_geometry(const BodyContact& contact) const noexcept;
+  bool admissible(std::size_t island) const noexcept;
+  bool sweep_pairs(double dt_s) noexcept;
+  bool sweep_pair(BodyPair& pair, double dt_s) noexcept;
+  bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
+  bool drop_separated() noexcept;
+  bool held_open(const BodyPair& pair, const SweepQuery::SweepResult& found) const noexcept;
+  void unsolve(std::size_t body) noexcept;
+  void shorten(const BodyPair& pair) noexcept;
+  void hold_all(double dt_s) noexcept;
+  void apply_impulses() noexcept;
+  void prefetch(double dt_s) noexcept;
+  BodyPath path_of(std::size_t body) const noexcept;
+
+  Settings settings_;
+  std::vector<Body> bodies_;
+  std::vector<std::unique_ptr<BodyPair>> pairs_;
+  std::vector<BodyContact> contacts_;
+  std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
+  std::vector<std::size_t> island_bodies_, island_contacts_;
+  ConeProjection cones_;
+  Pose X_WP_;  ///< of the hand
+  VisitBudget budget_;
+  double time_s_ = 0.0;
+  double last_change_m_ = 0.0;
+  std::uint32_t rounds_ = 0;
+};
+
+}  // namespace wrenchd
