@@ -336,6 +336,10 @@ BodyPath BodyWorld::path_of(std::size_t body) const noexcept {
   return {bodies_[body].motion.X_WB, bodies_[body].X_WQ};
 }
 
+bool BodyWorld::takes_part(std::size_t body) const noexcept {
+  return body == BodyContact::kFixed || bodies_[body].weight_per_s2 > 0.0;
+}
+
 /// Sweeps the pairs with a body whose end pose changed since the last sweeps. Returns true if all paths are
 /// free.
 bool BodyWorld::sweep_pairs(double dt_s) noexcept {
@@ -343,9 +347,6 @@ bool BodyWorld::sweep_pairs(double dt_s) noexcept {
   for (const auto& pair : pairs_) {
     const auto changed = [&](std::size_t i) {
       return i != BodyContact::kFixed && !same_bits(bodies_[i].X_WQ, bodies_[i].X_WQ_swept);
-    };
-    const auto takes_part = [&](std::size_t i) {
-      return i == BodyContact::kFixed || bodies_[i].weight_per_s2 > 0.0;
     };
     if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
     const bool moves = pair->is_fixed() && pair->scene().has_moving_obstacles();
@@ -477,15 +478,14 @@ void BodyWorld::hold_all(double dt_s) noexcept {
 /// Applies the impulses of all contacts to the motions without contact, METHOD (109).
 void BodyWorld::apply_impulses() noexcept {
   for (BodyContact& c : contacts_) {
-    const Vector3d impulse = bodies_[c.a == 0 ? c.b : c.a].step_s * c.force_W_N;
     const ContactGeometry at = acting_geometry(c);
-    const Vector3d point = at.point_W_m;
     c.slip_m = slip_m(c, at).norm();
     const auto push = [&](std::size_t i, double sign) {
       if (i == BodyContact::kFixed || i == 0) return;
       Body& body = bodies_[i];
-      body.free.velocity_W_m_per_s += sign / body.M.mass_kg * impulse;
-      body.free.spin_W += sign * (point - acting_pose(i).translation_m).cross(impulse);
+      const Vector3d impulse = sign * body.step_s * c.force_W_N;
+      body.free.velocity_W_m_per_s += impulse / body.M.mass_kg;
+      body.free.spin_W += (at.point_W_m - acting_pose(i).translation_m).cross(impulse);
     };
     push(c.a, 1.0);
     push(c.b, -1.0);
@@ -499,6 +499,7 @@ void BodyWorld::apply_impulses() noexcept {
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.
 void BodyWorld::prefetch(double dt_s) noexcept {
   for (const auto& pair : pairs_) {
+    if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
     const auto next = [&](std::size_t i) {
       if (i == BodyContact::kFixed) return BodyPath{};
       const BodyMotion& motion = bodies_[i].motion;

@@ -124,6 +124,7 @@ class BodyWorld {
   Pose acting_pose(std::size_t body) const noexcept;
   ContactGeometry acting_geometry(const BodyContact& contact) const noexcept;
   bool admissible(std::size_t island) const noexcept;
+  bool takes_part(std::size_t body) const noexcept;
   bool sweep_pairs(double dt_s) noexcept;
   bool sweep_pair(BodyPair& pair, double dt_s) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;

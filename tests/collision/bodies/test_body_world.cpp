@@ -8,6 +8,7 @@
 
 #include "collision/bodies/body_world.hpp"
 #include "collision/meshes/make_mesh.hpp"
+#include "collision/proxy.hpp"
 #include "core/energy_law.hpp"
 #include "core/metric.hpp"
 #include "tests/support/exact_intersection.hpp"
@@ -206,6 +207,35 @@ TEST_CASE("the tool pushes a body, and the hand feels its friction", "[body_worl
   CHECK(force_N == Approx(-0.4 * 0.1 * kGravity_m_per_s2).epsilon(0.03));
   const double moved_m = world.motion(1).X_WB.translation_m.x() - settled_m;
   CHECK(moved_m == Approx(0.05 * (kTicks - kSettled) * kStep_s).epsilon(0.03));
+}
+
+TEST_CASE("a tool among bodies that it does not touch follows its hand as a proxy does", "[body_world]") {
+  std::vector<MeshObstacle> obstacles;
+  obstacles.emplace_back("plate", MeshBvh(make_mesh({"box", 12, 1, {0.4, 0.4, 0.02}})),
+                         Pose{Quaterniond::Identity(), {0.0, 0.0, -0.01}});
+  const Scene scene(cube(), {}, {}, std::move(obstacles));
+  BodyWorld world(scene, {body_at({0.15, 0.0, 0.025 + 1e-8}, cube())}, {});
+  Proxy proxy(scene);
+  BodyMotion tool;
+  tool.X_WB.translation_m = {0.0, 0.0, 0.04};
+  world.place(0, tool);
+  Pose X_WQ = tool.X_WB;
+  double deepest_m = 0.0;
+  for (int k = 0; k < 1000; ++k) {
+    const double t_s = k * kStep_s;
+    Pose X_WP;
+    X_WP.translation_m = {0.02 * std::sin(3.0 * t_s), 0.01 * t_s, 0.032 - 0.012 * std::sin(6.0 * t_s)};
+    X_WP.rotation = rotation_from({0.2 * std::sin(5.0 * t_s), 0.15 * std::sin(4.0 * t_s), 0.3 * t_s});
+    REQUIRE(world.step(BodyWorld::Hand{X_WP, 2000.0}, kStep_s) == BodyWorld::Status::converged);
+    const Projection q = proxy.follow(X_WP, X_WQ);
+    REQUIRE(q.status != ProjectionStatus::infeasible);
+    X_WQ = q.X_WQ;
+    INFO("tick " << k);
+    CHECK((world.motion(0).X_WB.translation_m - X_WQ.translation_m).norm() < 1e-8);
+    CHECK(world.motion(0).X_WB.rotation.angularDistance(X_WQ.rotation) < 1e-6);
+    deepest_m = std::max(deepest_m, (X_WP.translation_m - X_WQ.translation_m).norm());
+  }
+  CHECK(deepest_m > 0.003);
 }
 
 TEST_CASE("an obstacle that moves lifts a body and carries it along", "[body_world]") {
