@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "collision/bodies/body_placement.hpp"
 #include "collision/meshes/convex_hull.hpp"
 #include "collision/meshes/mesh_convexity.hpp"
 
@@ -43,8 +44,8 @@ LoadedObstacle make(std::shared_ptr<const LoadedMesh> loaded, const MeshObstacle
   return loaded_obstacle;
 }
 
-/// Loads the meshes of the settings.
-Scene load(const SceneSettings& settings, MeshLoader& loader) {
+/// Loads tool and obstacles.
+Scene load_obstacles(const SceneSettings& settings, MeshLoader& loader) {
   ToolBody tool = load_tool(settings.tool, loader);
   if (settings.meshes.empty()) return Scene(std::move(tool), settings.half_spaces);
   require_size_for_contacts(tool.mesh, 1.0, settings.tool.mesh);
@@ -75,6 +76,22 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   auto tool_mesh = loader.build_bvh(tool.mesh, tool.kind, settings.tool.mesh, settings.surface_tolerance_m);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
+}
+
+/// Loads the meshes of the settings.
+Scene load(const SceneSettings& settings, MeshLoader& loader) {
+  Scene obstacles = load_obstacles(settings, loader);
+  if (settings.bodies.empty()) return obstacles;
+  if (!obstacles.tool_mesh()) {
+    require_size_for_contacts(obstacles.tool().mesh, 1.0, settings.tool.mesh);
+    obstacles = Scene(obstacles.tool(), obstacles.half_spaces(), {}, {},
+                      loader.build_bvh(obstacles.tool().mesh, obstacles.tool().kind, settings.tool.mesh,
+                                       settings.surface_tolerance_m));
+  }
+  std::vector<FreeBody> bodies;
+  for (const BodySettings& body : settings.bodies)
+    bodies.push_back(load_free_body(body, settings.surface_tolerance_m, loader));
+  return {obstacles, placed(std::move(bodies), obstacles, loader), settings.gravity_W_m_per_s2};
 }
 
 bool any_moves(const std::vector<MeshObstacle>& meshes) {
@@ -148,6 +165,18 @@ Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes
   }
   has_moving_obstacles_ = any_moves(meshes_);
   convex_.clear();  // convex() holds the previous poses
+}
+
+/// The global search knows obstacles only, so convex() is left empty.
+Scene::Scene(const Scene& other, std::vector<FreeBody> bodies, const Vector3d& gravity_W_m_per_s2)
+    : Scene(other) {
+  for (FreeBody& one : bodies)
+    if (!one.mesh) one.mesh = std::make_shared<const MeshBvh>(one.body.mesh, one.body.kind);
+  if (!tool_mesh_) tool_mesh_ = std::make_shared<const MeshBvh>(tool_.mesh, tool_.kind);
+  tool_radius_m_ = std::max(tool_radius_m_, tool_mesh_->surface.radius_m());
+  bodies_ = std::make_shared<const std::vector<FreeBody>>(std::move(bodies));
+  gravity_W_m_per_s2_ = gravity_W_m_per_s2;
+  convex_.clear();
 }
 
 Pose Scene::obstacle_displacement(std::uint32_t number, double from_s, double to_s) const noexcept {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "collision/bodies/free_body.hpp"
 #include "collision/meshes/mesh_bvh.hpp"
 #include "collision/meshes/mesh_loader.hpp"
 #include "collision/tool_body.hpp"
@@ -78,13 +79,24 @@ class Scene {
   /// no file. Not RT-safe: allocates.
   Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes);
 
+  /// Copies `other` with bodies that move by themselves, at admissible poses. gravity: acts on them. Not
+  /// RT-safe: allocates.
+  Scene(const Scene& other, std::vector<FreeBody> bodies, const Vector3d& gravity_W_m_per_s2);
+
   const ToolBody& tool() const noexcept { return tool_; }
   double tool_radius_m() const noexcept { return tool_radius_m_; }
   const std::vector<HalfSpaceSettings>& half_spaces() const noexcept { return half_spaces_; }
   const std::vector<ConvexObstacle>& convex() const noexcept { return convex_; }
   const std::vector<MeshObstacle>& meshes() const noexcept { return meshes_; }
-  /// BVH of the tool's mesh in T; null if the scene has no mesh obstacles.
+  /// BVH of the tool's mesh in T; null if the scene has neither mesh obstacles nor bodies.
   const MeshBvh* tool_mesh() const noexcept { return tool_mesh_.get(); }
+  const std::shared_ptr<const MeshBvh>& shared_tool_mesh() const noexcept { return tool_mesh_; }
+  /// The bodies that move by themselves, at their start. They are no obstacles of this scene; BodyWorld moves
+  /// them.
+  const std::vector<FreeBody>& bodies() const noexcept { return *bodies_; }
+  const Vector3d& gravity_W_m_per_s2() const noexcept { return gravity_W_m_per_s2_; }
+  /// True if both scenes have the same bodies: one is a copy of the other. RT-safe.
+  bool shares_bodies_with(const Scene& other) const noexcept { return bodies_ == other.bodies_; }
   /// true if any obstacle moves
   bool has_moving_obstacles() const noexcept { return has_moving_obstacles_; }
   /// Returns the displacement of an obstacle in the world between two scene times [s]: X_WO(to) =
@@ -105,6 +117,8 @@ class Scene {
   std::vector<ConvexObstacle> convex_;
   std::vector<MeshObstacle> meshes_;
   std::shared_ptr<const MeshBvh> tool_mesh_;
+  std::shared_ptr<const std::vector<FreeBody>> bodies_ = std::make_shared<const std::vector<FreeBody>>();
+  Vector3d gravity_W_m_per_s2_ = Vector3d::Zero();
   bool has_moving_obstacles_ = false;
 };
 

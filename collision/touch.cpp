@@ -153,6 +153,8 @@ std::string obstacle_name(const Scene& scene, std::uint32_t number) {
   const std::size_t k = number - half_spaces;
   if (k < scene.meshes().size()) return name_or_number(scene.meshes()[k].name, number);
   if (k < scene.convex().size()) return name_or_number(scene.convex()[k].name, number);
+  const std::size_t body = number - scene.obstacle_count();
+  if (body < scene.bodies().size()) return name_or_number(scene.bodies()[body].name, number);
   return name_or_number({}, number);
 }
 

@@ -41,16 +41,16 @@ std::string text(const Feature& feature);
 
 /// A contact for display and recording, in plain numbers.
 struct Touch {
-  std::array<double, 3> point_W_m{};   ///< contact point in W [m]
-  std::array<double, 3> normal_W{};    ///< unit normal from the obstacle to the tool, in W
-  double multiplier_kg_m = 0.0;        ///< d T / d gap: METHOD (35)
-  double load_fraction = 0.0;          ///< multiplier as a fraction of the sum over all contacts, 0 to 1
-  std::uint32_t obstacle = 0;          ///< obstacle number in the scene
-  std::uint32_t tool_first = 0;        ///< Feature::first of the tool's feature
-  std::uint32_t tool_second = 0;       ///< Feature::second of the tool's feature
-  std::uint32_t obstacle_first = 0;    ///< Feature::first of the obstacle's feature
-  std::uint32_t obstacle_second = 0;   ///< Feature::second of the obstacle's feature
-  std::uint8_t contact_kind = 0;       ///< ContactKind
+  std::array<double, 3> point_W_m{};  ///< contact point in W [m]
+  std::array<double, 3> normal_W{};   ///< unit normal from the obstacle to the tool, in W
+  double multiplier_kg_m = 0.0;       ///< d T / d gap: METHOD (35)
+  double load_fraction = 0.0;         ///< multiplier as a fraction of the sum over all contacts, 0 to 1
+  std::uint32_t obstacle = 0;         ///< obstacle number in the scene; free bodies count after the obstacles
+  std::uint32_t tool_first = 0;       ///< Feature::first of the tool's feature
+  std::uint32_t tool_second = 0;      ///< Feature::second of the tool's feature
+  std::uint32_t obstacle_first = 0;   ///< Feature::first of the obstacle's feature
+  std::uint32_t obstacle_second = 0;  ///< Feature::second of the obstacle's feature
+  std::uint8_t contact_kind = 0;      ///< ContactKind
   std::uint8_t tool_feature_kind = 0;  ///< FeatureKind of the tool's feature
   std::uint8_t obstacle_feature_kind = 0;
   std::uint8_t padding = 0;
@@ -69,7 +69,8 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
 Feature tool_feature(const Contact& contact, const Scene& scene, bool of_meshes) noexcept;
 Feature obstacle_feature(const Contact& contact, const Scene& scene, bool of_meshes) noexcept;
 
-/// Returns the name of an obstacle in the scene, or "obstacle 3" if it has none. Not RT-safe: allocates.
+/// Returns the name of an obstacle or body in the scene, or "obstacle 3" if it has none. Not RT-safe:
+/// allocates.
 std::string obstacle_name(const Scene& scene, std::uint32_t number);
 
 }  // namespace wrenchd

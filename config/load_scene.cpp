@@ -12,6 +12,7 @@
 #include "config/near_file.hpp"
 #include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
+#include "core/friction.hpp"
 #include "core/generated_mesh.hpp"
 
 namespace wrenchd {
@@ -28,6 +29,10 @@ constexpr Range kShellThickness_m = {1e-6, 1.0};
 constexpr Range kTensor = {-1e6, 1e6};
 constexpr Range kSurfaceTolerance_m = {0.0, 1e-3};
 constexpr Range kReversal_s = {0.0, 86400.0};
+constexpr Range kDensity_kg_per_m3 = {1e-3, 1e5};
+constexpr Range kDamping_per_s = {0.0, 1e3};
+constexpr Range kGravity_m_per_s2 = {-1000.0, 1000.0};
+constexpr Range kFriction = {0.0, FrictionSettings::kMaxCoefficient};
 
 /// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
@@ -171,17 +176,23 @@ void read_inertia(TomlTable& table, ToolSettings& tool) {
   tool.inertia_source = InertiaSource::given;
 }
 
+/// Reads shape, inertia and mass of the tool or of a body. Returns the key of the mass.
+TomlValue read_solid(TomlTable& table, const SceneReading& reading, ToolSettings& solid) {
+  const TomlValue meshes = table.optional("meshes");
+  read_shape(table.mandatory_unless("meshes", "mesh"), meshes, reading, solid.mesh, solid.generated,
+             solid.parts);
+  read_body_kind(table.optional("kind"), solid.kind);
+  read_inertia(table, solid);
+  table.optional("scale", "m").number(solid.scale, kScale);
+  const TomlValue mass = table.optional("mass", "kg");
+  mass.number(solid.mass_kg, kMass);
+  return mass;
+}
+
 /// The mass may be in [tool] or at the top of the file.
 void read_tool(TomlTable& table, const SceneReading& reading, const TomlValue& top_mass) {
   SceneSettings& scene = reading.scene;
-  const TomlValue meshes = table.optional("meshes");
-  read_shape(table.mandatory_unless("meshes", "mesh"), meshes, reading, scene.tool.mesh, scene.tool.generated,
-             scene.tool.parts);
-  read_body_kind(table.optional("kind"), scene.tool.kind);
-  read_inertia(table, scene.tool);
-  table.optional("scale", "m").number(scene.tool.scale, kScale);
-  const TomlValue mass = table.optional("mass", "kg");
-  mass.number(scene.tool.mass_kg, kMass);
+  const TomlValue mass = read_solid(table, reading, scene.tool);
   top_mass.number(scene.tool.mass_kg, kMass);
   if (mass && top_mass) mass.reject("is also given at the top of the file; keep one of the two");
 }
@@ -268,6 +279,54 @@ void read_obstacle(TomlTable& table, const SceneReading& reading, const std::str
   if (half_space) reading.scene.half_spaces.push_back(settings);
 }
 
+bool has_name(const SceneSettings& scene, const std::string& name) {
+  const auto has_it = [&name](const auto& one) { return one.name == name; };
+  return std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), has_it) ||
+         std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it) ||
+         std::any_of(scene.bodies.begin(), scene.bodies.end(), has_it);
+}
+
+/// Reads a body that moves by itself. Clients and the page name it, so no obstacle may have its name.
+void read_body(TomlTable& table, const SceneReading& reading, const std::string& place) {
+  BodySettings body;
+  body.name = place;
+  const TomlValue name = table.optional("name");
+  name.text(body.name);
+  if (name && has_name(reading.scene, body.name))
+    name.reject("there is an obstacle or a body '" + body.name + "' already; give this one another name");
+  const TomlValue mass = read_solid(table, reading, body.shape);
+  const TomlValue density = table.optional("density_kg_per_m3");
+  if (double value = 0.0; density.number(value, kDensity_kg_per_m3)) body.density_kg_per_m3 = value;
+  if (mass && density)
+    density.reject("the body has a mass already; keep one of 'mass' and 'density_kg_per_m3'");
+  if (density && body.shape.inertia_source != InertiaSource::solid)
+    density.reject("needs the volume of a solid; give 'mass' to a body with another inertia");
+  table.optional("position_m").vector(body.X_WM.translation_m, kAny);
+  Vector3d rotation_vector_rad = Vector3d::Zero();
+  table.optional("rotation_vector_rad").vector(rotation_vector_rad, kRotation);
+  body.X_WM.rotation = rotation_from(rotation_vector_rad);
+  read_velocity(table.optional("velocity_m_per_s"), ObstacleMotion::kMaxSpeed_m_per_s, body.velocity_m_per_s);
+  read_velocity(table.optional("angular_velocity_rad_per_s"), ObstacleMotion::kMaxAngularSpeed_rad_per_s,
+                body.spin_rad_per_s);
+  table.optional("friction").number(body.friction, kFriction);
+  table.optional("linear_damping_per_s").number(body.linear_damping_per_s, kDamping_per_s);
+  table.optional("angular_damping_per_s").number(body.angular_damping_per_s, kDamping_per_s);
+  reading.scene.bodies.push_back(std::move(body));
+}
+
+void read_bodies(TomlTable& table, const SceneReading& reading) {
+  const TomlValue gravity = table.optional("gravity_m_per_s2");
+  gravity.vector(reading.scene.gravity_W_m_per_s2, kGravity_m_per_s2);
+  const TomlValue bodies = table.optional("body");
+  if (gravity && !bodies)
+    gravity.reject("acts on free bodies, and the scene has none; add a [[body]], or leave this out");
+  for (const TomlValue& body : bodies.elements("tables, each headed [[body]]"))
+    body.table(read_body, reading, body.name());
+  if (reading.scene.bodies.size() > SceneSettings::kMaxBodies)
+    bodies.reject("has " + std::to_string(reading.scene.bodies.size()) + " bodies; a scene may have " +
+                  std::to_string(SceneSettings::kMaxBodies));
+}
+
 void read_scene(TomlTable& table, const SceneReading& reading) {
   SceneSettings& scene = reading.scene;
   const TomlValue mass = table.optional("mass", "kg");
@@ -276,12 +335,7 @@ void read_scene(TomlTable& table, const SceneReading& reading) {
   for (const TomlValue& obstacle : table.optional("obstacle").elements("tables, each headed [[obstacle]]")) {
     obstacle.table(read_obstacle, reading, obstacle.name());
   }
-}
-
-bool has_name(const SceneSettings& scene, const std::string& name) {
-  const auto has_it = [&name](const auto& obstacle) { return obstacle.name == name; };
-  return std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), has_it) ||
-         std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
+  read_bodies(table, reading);
 }
 
 /// Reads an added obstacle. It needs a unique name, because clients move and remove it by name.
@@ -290,7 +344,7 @@ void read_added(TomlTable& table, const SceneReading& reading) {
   std::string name;
   const TomlValue key = table.optional("name");
   if (key.text(name) && has_name(scene, name))
-    key.reject("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
+    key.reject("there is an obstacle or a body '" + name + "' already; give this one another name");
   for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
     if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
   read_obstacle(table, reading, name);

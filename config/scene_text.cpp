@@ -102,17 +102,41 @@ std::string tool_lines(const ToolSettings& tool) {
          (tool.kind == BodyKind::surface ? "kind = \"surface\"\n" : "") + inertia_lines(tool);
 }
 
+/// A body at its start.
+std::string free_body(const BodySettings& body) {
+  const auto with_default = [](const char* key, double value) {
+    return value == 0.0 ? std::string() : key + (" = " + to_text(value)) + "\n";
+  };
+  const ToolSettings& shape = body.shape;
+  std::string text = "\n[[body]]\nname = " + quoted(body.name) + "\n" + mesh_line(shape) +
+                     "scale = " + to_text(shape.scale) + "\n" +
+                     (body.density_kg_per_m3 ? "density_kg_per_m3 = " + to_text(*body.density_kg_per_m3)
+                                             : "mass = " + to_text(shape.mass_kg)) +
+                     "\n" + (shape.kind == BodyKind::surface ? "kind = \"surface\"\n" : "") +
+                     inertia_lines(shape) + "position_m = " + array(body.X_WM.translation_m) +
+                     "\nrotation_vector_rad = " + array(rotation_vector(body.X_WM.rotation)) +
+                     "\nfriction = " + to_text(body.friction) + "\n";
+  if (!body.velocity_m_per_s.isZero(0.0)) text += "velocity_m_per_s = " + array(body.velocity_m_per_s) + "\n";
+  if (!body.spin_rad_per_s.isZero(0.0))
+    text += "angular_velocity_rad_per_s = " + array(body.spin_rad_per_s) + "\n";
+  return text + with_default("linear_damping_per_s", body.linear_damping_per_s) +
+         with_default("angular_damping_per_s", body.angular_damping_per_s);
+}
+
 }  // namespace
 
 std::string scene_text(const SceneSettings& scene, double now_s) {
-  std::string text = "# The scene as clients of wrenchd have changed it, at scene time " + to_text(now_s) +
-                     " s.\nsurface_tolerance_m = " + to_text(scene.surface_tolerance_m) + "\n\n[tool]\n" +
-                     tool_lines(scene.tool);
+  std::string text =
+      "# The scene as clients of wrenchd have changed it, at scene time " + to_text(now_s) +
+      " s.\nsurface_tolerance_m = " + to_text(scene.surface_tolerance_m) + "\n" +
+      (scene.bodies.empty() ? "" : "gravity_m_per_s2 = " + array(scene.gravity_W_m_per_s2) + "\n") +
+      "\n[tool]\n" + tool_lines(scene.tool);
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
     text += "\n[[obstacle]]\nname = " + quoted(obstacle.name) +
             "\nhalf_space = { normal = " + array(obstacle.normal_W) +
             ", offset = " + to_text(obstacle.offset_m) + " }\n";
   for (const MeshObstacleSettings& obstacle : scene.meshes) text += mesh_obstacle(obstacle, now_s);
+  for (const BodySettings& body : scene.bodies) text += free_body(body);
   return text;
 }
 

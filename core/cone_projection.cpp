@@ -21,7 +21,7 @@ ConeProjection::ConeProjection(std::size_t max_bodies, std::size_t max_cones) {
   const auto size = at(max_bodies);
   cones_.reserve(max_cones);
   active_.reserve(static_cast<std::size_t>(size) + 1);
-  last_.reserve(static_cast<std::size_t>(size) + 1);
+  suggested_.reserve(static_cast<std::size_t>(size) + 1);
   behind_.reserve(static_cast<std::size_t>(size) + 1);
   for (Eigen::VectorXd* vector : {&z0_, &z_, &rest_, &r_, &d_}) vector->setZero(size);
   Q_.setZero(size, size);
@@ -31,6 +31,15 @@ ConeProjection::ConeProjection(std::size_t max_bodies, std::size_t max_cones) {
 void ConeProjection::clear(std::size_t bodies) noexcept {
   dimension_ = static_cast<std::size_t>(at(bodies));
   cones_.clear();
+  suggested_.clear();
+}
+
+void ConeProjection::suggest(std::size_t cone, const Vector3d& normal) noexcept {
+  if (suggested_.size() == suggested_.capacity()) return;
+  HalfSpace one;
+  one.cone = cone;
+  one.normal = normal;
+  suggested_.push_back(one);
 }
 
 bool ConeProjection::add(const FrictionCone& cone) noexcept {
@@ -97,11 +106,11 @@ bool ConeProjection::most_violated(double tolerance_m, HalfSpace& worst) const n
   return most > 0.0;
 }
 
-ConeProjection::Status ConeProjection::solve(double tolerance_m, bool starts_with_last) noexcept {
+ConeProjection::Status ConeProjection::solve(double tolerance_m) noexcept {
   z_ = z0_;
   active_.clear();
   steps_ = 0;
-  if (starts_with_last) start_with_last();
+  start_with_suggested();
   const std::size_t max_steps = kMaxStepsPerUnknown * (dimension_ + cones_.size()) + kMaxStepsPerUnknown;
   Status status = Status::budget_spent;
   HalfSpace worst;
@@ -115,14 +124,13 @@ ConeProjection::Status ConeProjection::solve(double tolerance_m, bool starts_wit
       break;
     }
   }
-  last_ = active_;  // equal capacities: no allocation
   return status;
 }
 
-/// Makes the half-spaces of the last solve active, with their directions and the cones of this problem, and
-/// drops those with a negative multiplier, the most negative one first.
-void ConeProjection::start_with_last() noexcept {
-  for (const HalfSpace& old : last_) {
+/// Makes the suggested half-spaces active, with their directions and the cones of this problem, and drops
+/// those with a negative multiplier, the most negative one first.
+void ConeProjection::start_with_suggested() noexcept {
+  for (const HalfSpace& old : suggested_) {
     if (old.cone >= cones_.size()) continue;
     const FrictionCone& cone = cones_[old.cone];
     Vector3d direction = Vector3d::Zero();
@@ -134,7 +142,7 @@ void ConeProjection::start_with_last() noexcept {
     const HalfSpace half_space = tangent(old.cone, direction);
     if (half_space.length > 0.0) append(half_space);
   }
-  for (;;) {
+  while (!active_.empty()) {
     recompute();
     std::size_t worst = active_.size();
     double most = 0.0;
@@ -254,6 +262,13 @@ void ConeProjection::drop(std::size_t k) noexcept {
   behind_.assign(active_.begin() + static_cast<std::ptrdiff_t>(k) + 1, active_.end());
   active_.resize(k);
   for (const HalfSpace& half_space : behind_) append(half_space);
+}
+
+StaticVector<Vector3d, 4> ConeProjection::active_normals(std::size_t cone) const noexcept {
+  StaticVector<Vector3d, 4> out;
+  for (const HalfSpace& one : active_)
+    if (one.cone == cone) out.add(one.normal);
+  return out;
 }
 
 Vector3d ConeProjection::force(std::size_t cone) const noexcept {

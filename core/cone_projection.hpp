@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/pose.hpp"
+#include "core/static_vector.hpp"
 
 namespace wrenchd {
 
@@ -53,15 +54,18 @@ class ConeProjection {
   /// The components of z0 for a body.
   Eigen::Ref<Vector6d> z0(std::size_t body) noexcept { return z0_.segment<kBlock>(at(body)); }
 
-  /// Solves. tolerance_m: accepted violation of a cone [m]. starts_with_last: if true, the half-spaces that
-  /// were active at the end of the last solve are tried first; the cones must be the same ones in the same
-  /// order.
-  Status solve(double tolerance_m, bool starts_with_last = false) noexcept;
+  /// Names a half-space that solve() tries first, by the normal that normals() returned for it.
+  void suggest(std::size_t cone, const Vector3d& normal) noexcept;
+  /// Solves. tolerance_m: accepted violation of a cone [m].
+  Status solve(double tolerance_m) noexcept;
 
   /// The answer for a body.
   Vector6d z(std::size_t body) const noexcept { return z_.segment<kBlock>(at(body)); }
   /// The force of a cone on its body a, in the axes of n: z - z0 = sum D' force.
   Vector3d force(std::size_t cone) const noexcept;
+  /// The normals n - mu direction of the half-spaces of a cone that are active at the answer, at most four. A
+  /// point has three independent ones.
+  StaticVector<Vector3d, 4> active_normals(std::size_t cone) const noexcept;
   std::size_t cone_count() const noexcept { return cones_.size(); }
   std::size_t steps() const noexcept { return steps_; }  ///< half-spaces activated by the last solve
 
@@ -81,7 +85,7 @@ class ConeProjection {
   double product(const HalfSpace& half_space, const Eigen::VectorXd& z) const noexcept;
   void scatter(const HalfSpace& half_space, double factor, Eigen::VectorXd& z) const noexcept;
   bool most_violated(double tolerance_m, HalfSpace& worst) const noexcept;
-  void start_with_last() noexcept;
+  void start_with_suggested() noexcept;
   bool activate(HalfSpace entering) noexcept;
   void project_out(Eigen::VectorXd& rest, Eigen::VectorXd& r) const noexcept;
   void back_substitute(const Eigen::VectorXd& r, Eigen::VectorXd& d) const noexcept;
@@ -92,8 +96,9 @@ class ConeProjection {
 
   std::size_t dimension_ = 0;
   std::vector<FrictionCone> cones_;
-  std::vector<HalfSpace> active_, last_;  ///< active now; active at the end of the last solve
-  std::vector<HalfSpace> behind_;         ///< for drop()
+  std::vector<HalfSpace> active_;
+  std::vector<HalfSpace> suggested_;  ///< only their cones and normals
+  std::vector<HalfSpace> behind_;     ///< for drop()
   Eigen::VectorXd z0_, z_, rest_, r_, d_;
   Eigen::MatrixXd Q_;  ///< orthonormal columns
   Eigen::MatrixXd R_;  ///< upper triangle: active normals = Q R

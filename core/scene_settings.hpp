@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -63,6 +64,20 @@ struct MeshObstacleSettings {
   std::vector<std::filesystem::path> parts = {};
 };
 
+/// A rigid body that moves by itself. Its shape and inertia are given as those of a tool. M: frame of the
+/// mesh file.
+struct BodySettings {
+  std::string name;
+  ToolSettings shape;
+  std::optional<double> density_kg_per_m3;       ///< gives the mass, in place of shape.mass_kg
+  Pose X_WM;                                     ///< pose at the start
+  Vector3d velocity_m_per_s = Vector3d::Zero();  ///< of the centre of mass at the start, in W
+  Vector3d spin_rad_per_s = Vector3d::Zero();    ///< angular velocity at the start, in W
+  double friction = 0.5;                         ///< coefficient against obstacles
+  double linear_damping_per_s = 0.0;
+  double angular_damping_per_s = 0.0;
+};
+
 /// Returns the files of the meshes of a body; none if wrenchd generates its mesh. Not RT-safe: allocates.
 template <class Body>
 std::vector<std::filesystem::path> mesh_files(const Body& body) {
@@ -75,6 +90,9 @@ struct SceneSettings {
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
   std::vector<MeshObstacleSettings> meshes;
+  static constexpr std::size_t kMaxBodies = 8;
+  std::vector<BodySettings> bodies;
+  Vector3d gravity_W_m_per_s2 = {0.0, 0.0, -9.81};  ///< acts on the bodies
   /// Contacts may use a surface that encloses a solid and lies at most this far outside of it [m]; 0: the
   /// mesh as loaded. Rounding of single precision may raise it (collision/meshes/mesh_simplifier.hpp).
   double surface_tolerance_m = 1e-6;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "collision/bodies/body_placement.hpp"
 #include "collision/feasible_pose_search.hpp"
 #include "core/state_machine.hpp"
 #include "devices/simulation/hand_path.hpp"
@@ -32,7 +33,8 @@ std::vector<Pose> poses_until_armed(const Scene& scene, const Settings& settings
 
 }  // namespace
 
-std::optional<Vector3d> displacement_to_clear_start(const Scene& scene, const Settings& settings) {
+std::optional<Vector3d> displacement_to_clear_start(const Scene& given, const Settings& settings) {
+  const Scene scene = given.bodies().empty() ? given : with_bodies_as_obstacles(given);
   const std::vector<Pose> poses = poses_until_armed(scene, settings);
   FeasiblePoseSearch search(scene, settings.rendering.contacts);
   const auto clear = [&](const Vector3d& d_W_m) {

@@ -65,6 +65,9 @@ std::string about(const SceneSettings& settings, double rate_Hz, MeshLoader& mes
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';
+  for (const FreeBody& body : scene.bodies())
+    text << "  free body " << body.name << ": mass " << body.body.solid.inertia.mass_kg << " kg, "
+         << body.body.mesh.triangles.size() << " triangles, friction " << body.friction << '\n';
   for (const std::string& simplification : meshes.simplifications()) text << "  " << simplification << '\n';
   text << cost_text(scene, rate_Hz);
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';

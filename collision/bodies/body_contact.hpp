@@ -6,6 +6,7 @@
 #include "core/cone_projection.hpp"
 #include "core/contact.hpp"
 #include "core/pose.hpp"
+#include "core/static_vector.hpp"
 
 namespace wrenchd {
 
@@ -20,9 +21,13 @@ struct BodyContact {
   double mu = 0.0;  ///< coefficient of friction
   /// Motion of the obstacle in this tick: X_WO(end) = obstacle_motion * X_WO(start). Identity for a body b.
   Pose obstacle_motion;
-  Vector3d force_W_N = Vector3d::Zero();  ///< force on body a, in the last step
-  double slip_m = 0.0;                    ///< length of the slip in the last step
-  bool stays = false;                     ///< is not dropped in this step
+  Vector3d force_W_N = Vector3d::Zero();       ///< force on body a, in the last step
+  Vector3d last_force_W_N = Vector3d::Zero();  ///< force on body a, in the step before
+  Vector3d point_W_m = Vector3d::Zero();       ///< where it acted in the last step
+  Vector3d normal_W = Vector3d::UnitZ();       ///< unit normal towards body a, where it acted
+  double slip_m = 0.0;                         ///< length of the slip in the last step
+  StaticVector<Vector3d, 4> active_normals;    ///< of its cone, at the last answer (ConeProjection)
+  bool stays = false;                          ///< is not dropped in this step
 };
 
 /// The gap [m], the normal and the contact point in W of a contact. X_WA, X_WB: poses of its bodies; X_WB is

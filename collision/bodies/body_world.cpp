@@ -16,8 +16,8 @@ namespace {
 /// Newton steps of an island: at most this number with the slip of the last iterate, METHOD (106), then at
 /// most this number with the relaxed cone.
 constexpr int kNewtonSteps = 16;
-/// A solve ends if no point moved farther than this in a Newton step [m].
-constexpr double kConverged_m = 1e-12;
+/// A solve ends if no point moved farther than this in a Newton step [m]. It is small against the clearance.
+constexpr double kConverged_m = 1e-10;
 /// Accepted violation of a cone in a Newton step [m].
 constexpr double kTolerance_m = 1e-13;
 /// Least gap of an admissible pose and of a contact that is held at less than the clearance, and the largest
@@ -27,6 +27,10 @@ constexpr double kTouch = 1.1;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
+/// A body whose fastest point moves more slowly than this [m/s] for this number of steps may fall asleep.
+/// What begins to slide or to topple is faster within a few steps.
+constexpr double kCalmSpeed_m_per_s = 1e-5;
+constexpr std::uint16_t kCalmSteps = 100;
 
 /// The pose at a fraction of the straight path between two poses.
 Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
@@ -49,10 +53,10 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
   bodies_[0].friction = settings.tool_friction;
   bodies_[0].radius_m = scene.tool_radius_m();
   std::vector<std::shared_ptr<const MeshBvh>> meshes(bodies_.size());
-  meshes[0] = std::make_shared<const MeshBvh>(scene.tool().mesh, scene.tool().kind);
+  meshes[0] = scene.tool_mesh() != nullptr ? scene.shared_tool_mesh() : bvh_of(scene.tool());
   for (std::size_t i = 1; i < bodies_.size(); ++i) {
     FreeBody& given = bodies[i - 1];
-    meshes[i] = bvh_of(given.body);
+    meshes[i] = given.mesh ? given.mesh : bvh_of(given.body);
     Body& body = bodies_[i];
     body.name = given.name;
     body.M = given.body.solid.inertia;
@@ -77,6 +81,8 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
     }
   }
   contacts_.reserve(kMaxContacts);
+  contacts_before_.reserve(kMaxContacts);
+  bodies_before_.reserve(bodies_.size());
   dropped_.reserve(kMaxContacts);
   island_contacts_.reserve(kMaxContacts);
   island_bodies_.reserve(bodies_.size());
@@ -84,6 +90,10 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
 
 void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
   bodies_[body].motion = motion;
+  for (Body& one : bodies_) {
+    one.asleep = false;
+    one.calm_steps = 0;
+  }
   std::erase_if(contacts_, [&](const BodyContact& c) { return c.a == body || c.b == body; });
   for (const auto& pair : pairs_)
     if (pair->a() == body || pair->b() == body) pair->reset();
@@ -97,27 +107,35 @@ double BodyWorld::energy_J() const noexcept {
   return sum;
 }
 
-BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s) noexcept {
-  begin(hand, dt_s);
+BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, double until_s) noexcept {
+  dt_s_ = dt_s;
+  until_s_ = until_s;
+  begin(hand);
   bool clean = false;
   for (rounds_ = 0; rounds_ < settings_.rounds && !clean; ++rounds_) {
-    solve_islands(dt_s);
-    clean = sweep_pairs(dt_s);
+    solve_islands();
+    clean = sweep_pairs();
     if (clean) clean = !drop_separated();
   }
-  if (!clean) hold_all(dt_s);
+  if (!clean) hold_all();
   apply_impulses();
-  if (clean) time_s_ += dt_s;
-  prefetch(dt_s);
+  if (clean) time_s_ = until_s;
+  if (settings_.sleeps) fall_asleep();
+  prefetch();
   return clean ? Status::converged : Status::budget_spent;
 }
 
 /// Sets the goals of all bodies and moves the contacts with the obstacles that move.
-void BodyWorld::begin(const std::optional<Hand>& hand, double dt_s) noexcept {
+void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
+  bodies_before_.clear();
+  for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
+  contacts_before_ = contacts_;  // equal capacities: no allocation
+  time_before_s_ = time_s_;
   budget_ = {settings_.node_visits};
   last_change_m_ = 0.0;
   for (Body& body : bodies_) {
-    body.touches = body.solved = false;
+    body.touches = false;
+    body.solved = body.asleep;
     body.fraction = 1.0;
     body.weight_per_s2 = 1.0;
     body.X_WQ = body.X_WQ_swept = body.motion.X_WB;
@@ -129,21 +147,26 @@ void BodyWorld::begin(const std::optional<Hand>& hand, double dt_s) noexcept {
   dropped_.clear();
   for (BodyContact& contact : contacts_) {
     contact.stays = false;
+    contact.last_force_W_N = contact.force_W_N;
     bodies_[contact.a].touches = true;
     if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
   }
-  move_contacts(time_s_, time_s_ + dt_s);
-  for (Body& body : bodies_) set_goal(body, dt_s);
+  move_contacts(time_s_, until_s_);
+  for (Body& body : bodies_) set_goal(body);
 }
 
 /// A body without contact ends where its exact motion ends. One with contact moves at the velocity that it
 /// has at the end, METHOD (102). In a shortened step less time passes for the body.
-void BodyWorld::set_goal(Body& body, double dt_s) noexcept {
-  if (&body == &bodies_[0]) {
+void BodyWorld::set_goal(Body& body) noexcept {
+  if (body.asleep) {
+    body.step_s = 0.0;
+    body.free = body.motion;
+    body.X_goal = body.motion.X_WB;
+  } else if (&body == &bodies_[0]) {
     body.free = body.motion;
     body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_WP_, body.fraction) : X_WP_;
   } else {
-    body.step_s = body.fraction * dt_s;
+    body.step_s = body.fraction * dt_s_;
     body.weight_per_s2 = 1.0 / (body.step_s * body.step_s);
     body.free = moved_freely(body.M, body.motion, body.forces, body.step_s);
     body.X_goal = body.free.X_WB;
@@ -182,7 +205,7 @@ void BodyWorld::find_islands() noexcept {
 }
 
 /// Solves the islands with a body whose contacts changed.
-void BodyWorld::solve_islands(double dt_s) noexcept {
+void BodyWorld::solve_islands() noexcept {
   find_islands();
   for (std::size_t island = 0; island < bodies_.size(); ++island) {
     if (bodies_[island].island != island) continue;
@@ -197,7 +220,7 @@ void BodyWorld::solve_islands(double dt_s) noexcept {
     for (Body& body : bodies_) {
       if (body.island != island || body.weight_per_s2 == 0.0) continue;
       body.fraction = fraction;
-      set_goal(body, dt_s);
+      set_goal(body);
     }
     solve_island(island);
   }
@@ -221,7 +244,7 @@ void BodyWorld::solve_island(std::size_t island) noexcept {
   for (const Slip slip : {Slip::last_iterate, Slip::none}) {
     for (int k = 0; k < kNewtonSteps; ++k) {
       const bool first = k == 0 && slip == Slip::last_iterate;
-      if (newton_step(first ? Slip::last_step : slip, k > 0) && k > 0) break;
+      if (newton_step(first ? Slip::last_step : slip) && k > 0) break;
     }
     if (admissible(island)) return;
   }
@@ -251,17 +274,22 @@ bool BodyWorld::admissible(std::size_t island) const noexcept {
   });
 }
 
+/// Displacement in this step of the material point that is at point_W_m where contacts act.
+Vector3d BodyWorld::displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept {
+  const Vector3d p_B = inverse(acting_pose(body)) * point_W_m;
+  return bodies_[body].X_WQ * p_B - bodies_[body].motion.X_WB * p_B;
+}
+
+/// The same of body b of a contact, or of its obstacle.
+Vector3d BodyWorld::other_displacement_m(const BodyContact& c, const Vector3d& point_W_m) const noexcept {
+  return c.b == BodyContact::kFixed ? Vector3d(point_W_m - inverse(c.obstacle_motion) * point_W_m)
+                                    : displacement_m(c.b, point_W_m);
+}
+
 /// Displacement of the point of body a against that of body b (or of the obstacle) in this step, along the
 /// surface: METHOD (104). at: the acting geometry.
 Vector3d BodyWorld::slip_m(const BodyContact& c, const ContactGeometry& at) const noexcept {
-  const auto displacement = [&](std::size_t body) {
-    const Vector3d p_B = inverse(acting_pose(body)) * at.point_W_m;
-    return Vector3d(bodies_[body].X_WQ * p_B - bodies_[body].motion.X_WB * p_B);
-  };
-  const Vector3d other = c.b == BodyContact::kFixed
-                             ? Vector3d(at.point_W_m - inverse(c.obstacle_motion) * at.point_W_m)
-                             : displacement(c.b);
-  const Vector3d moved = displacement(c.a) - other;
+  const Vector3d moved = displacement_m(c.a, at.point_W_m) - other_displacement_m(c, at.point_W_m);
   return moved - at.n_W.dot(moved) * at.n_W;
 }
 
@@ -294,7 +322,7 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Slip slip) const noexcept 
 }
 
 /// One Newton step of an island, METHOD (99), (105). Returns true if it moved no point.
-bool BodyWorld::newton_step(Slip slip, bool starts_with_last) noexcept {
+bool BodyWorld::newton_step(Slip slip) noexcept {
   cones_.clear(island_bodies_.size());
   for (const std::size_t i : island_bodies_) {
     Body& body = bodies_[i];
@@ -311,8 +339,12 @@ bool BodyWorld::newton_step(Slip slip, bool starts_with_last) noexcept {
                    (body.X_goal.translation_m - body.X_WQ.translation_m);
     z0.tail<3>() = -body.root.transpose().triangularView<Eigen::Lower>().solve(torque);
   }
-  for (const std::size_t k : island_contacts_) cones_.add(cone_of(contacts_[k], slip));
-  cones_.solve(kTolerance_m, starts_with_last);
+  for (const std::size_t k : island_contacts_) {
+    const BodyContact& contact = contacts_[k];
+    for (const Vector3d& normal : contact.active_normals) cones_.suggest(cones_.cone_count(), normal);
+    cones_.add(cone_of(contact, slip));
+  }
+  cones_.solve(kTolerance_m);
   double change_m = 0.0;
   for (const std::size_t i : island_bodies_) {
     Body& body = bodies_[i];
@@ -326,6 +358,7 @@ bool BodyWorld::newton_step(Slip slip, bool starts_with_last) noexcept {
   for (std::size_t k = 0; k < island_contacts_.size(); ++k) {
     BodyContact& contact = contacts_[island_contacts_[k]];
     contact.force_W_N = cones_.force(k);
+    contact.active_normals = cones_.active_normals(k);
   }
   last_change_m_ = change_m;
   return change_m <= kConverged_m;
@@ -342,7 +375,7 @@ bool BodyWorld::takes_part(std::size_t body) const noexcept {
 
 /// Sweeps the pairs with a body whose end pose changed since the last sweeps. Returns true if all paths are
 /// free.
-bool BodyWorld::sweep_pairs(double dt_s) noexcept {
+bool BodyWorld::sweep_pairs() noexcept {
   bool free = true;
   for (const auto& pair : pairs_) {
     const auto changed = [&](std::size_t i) {
@@ -351,14 +384,14 @@ bool BodyWorld::sweep_pairs(double dt_s) noexcept {
     if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
     const bool moves = pair->is_fixed() && pair->scene().has_moving_obstacles();
     if (!moves && !changed(pair->a()) && !changed(pair->b())) continue;
-    if (!sweep_pair(*pair, dt_s)) free = false;
+    if (!sweep_pair(*pair)) free = false;
   }
   if (free)
     for (Body& body : bodies_) body.X_WQ_swept = body.X_WQ;
   return free;
 }
 
-bool BodyWorld::sweep_pair(BodyPair& pair, double dt_s) noexcept {
+bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
   bool free = true;
   if (pair.is_fixed() && !pair.scene().half_spaces().empty()) {
     ContactSet met;
@@ -371,7 +404,7 @@ bool BodyWorld::sweep_pair(BodyPair& pair, double dt_s) noexcept {
   const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
   if (!pair.is_near(path_a, path_b)) return free;
   const SweepQuery::SweepResult found =
-      pair.sweep(path_a, path_b, kClearance_m, budget_, {time_s_, time_s_ + dt_s});
+      pair.sweep(path_a, path_b, kClearance_m, budget_, {time_s_, until_s_});
   bool found_new = false;
   for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return false;
@@ -392,8 +425,47 @@ bool BodyWorld::held_open(const BodyPair& pair, const SweepQuery::SweepResult& f
 
 void BodyWorld::unsolve(std::size_t body) noexcept {
   if (body == BodyContact::kFixed) return;
+  if (bodies_[body].asleep) wake(body);
   bodies_[body].solved = false;
   bodies_[body].touches = true;
+}
+
+/// Wakes the island of a body, in the course of a step.
+void BodyWorld::wake(std::size_t body) noexcept {
+  const std::size_t island = bodies_[body].island;
+  for (Body& one : bodies_) {
+    if (one.island != island || !one.asleep) continue;
+    one.asleep = one.solved = false;
+    one.calm_steps = 0;
+    set_goal(one);
+  }
+}
+
+/// Puts the islands to sleep whose bodies have all been calm, and which neither the tool nor an obstacle that
+/// moves touches.
+void BodyWorld::fall_asleep() noexcept {
+  find_islands();
+  for (Body& body : bodies_) {
+    const double speed_m_per_s = body.motion.velocity_W_m_per_s.norm() +
+                                 body.radius_m * angular_velocity_W(body.M, body.motion).norm();
+    const bool calm = body.touches && speed_m_per_s < kCalmSpeed_m_per_s;
+    body.calm_steps = calm ? std::min<std::uint16_t>(body.calm_steps + 1, kCalmSteps) : std::uint16_t{0};
+  }
+  bodies_[0].calm_steps = 0;
+  for (const BodyContact& c : contacts_)
+    if (c.b == BodyContact::kFixed && pair_of(c).scene().has_moving_obstacles()) bodies_[c.a].calm_steps = 0;
+  for (std::size_t island = 0; island < bodies_.size(); ++island) {
+    const bool calm = std::all_of(bodies_.begin(), bodies_.end(), [&](const Body& body) {
+      return body.island != island || body.calm_steps == kCalmSteps;
+    });
+    if (!calm) continue;
+    for (Body& body : bodies_) {
+      if (body.island != island || body.asleep) continue;
+      body.asleep = true;
+      body.motion.velocity_W_m_per_s.setZero();
+      body.motion.spin_W.setZero();
+    }
+  }
 }
 
 /// Lets the bodies of a pair try a shorter way.
@@ -439,17 +511,20 @@ bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexce
   return true;
 }
 
+const BodyPair& BodyWorld::pair_of(const BodyContact& contact) const noexcept {
+  return **std::find_if(pairs_.begin(), pairs_.end(),
+                        [&](const auto& pair) { return pair->a() == contact.a && pair->b() == contact.b; });
+}
+
 /// Drops contacts that do not touch, and contacts whose features do not face each other. Returns true if one
 /// of these carried: the poses are then solved again. If a sweep then finds the same contact once more, as at
 /// the border of a face, the contact stays until the next step.
 bool BodyWorld::drop_separated() noexcept {
   bool carried = false;
   std::erase_if(contacts_, [&](const BodyContact& c) {
-    const auto pair = std::find_if(pairs_.begin(), pairs_.end(),
-                                   [&](const auto& p) { return p->a() == c.a && p->b() == c.b; });
     const bool open = geometry(c).gap_m > kTouch * kClearance_m;
     const bool loaded = c.force_W_N.squaredNorm() > 0.0;
-    if (c.stays || (open ? loaded : (*pair)->touches(c.contact))) return false;
+    if (bodies_[c.a].asleep || c.stays || (open ? loaded : pair_of(c).touches(c.contact))) return false;
     if (!loaded) return true;
     carried = true;
     if (dropped_.size() < dropped_.capacity()) dropped_.push_back(c);
@@ -460,26 +535,61 @@ bool BodyWorld::drop_separated() noexcept {
   return carried;
 }
 
+void BodyWorld::take_back() noexcept {
+  for (std::size_t i = 0; i < bodies_before_.size(); ++i) {
+    bodies_[i].motion = bodies_before_[i].motion;
+    bodies_[i].asleep = bodies_before_[i].asleep;
+    bodies_[i].calm_steps = bodies_before_[i].calm_steps;
+  }
+  contacts_ = contacts_before_;  // equal capacities: no allocation
+  time_s_ = time_before_s_;
+}
+
+/// A sweep from an admissible start that meets nothing ends at an admissible pose. The tool rests on it, and
+/// the bodies move from where they were to where they are.
+bool BodyWorld::admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s) noexcept {
+  VisitBudget budget{settings_.node_visits};
+  return std::all_of(pairs_.begin(), pairs_.end(), [&](const auto& pair) {
+    if (pair->a() != 0) return true;
+    BodyPath other;
+    if (!pair->is_fixed()) other = {X_WB_then[pair->b() - 1], bodies_[pair->b()].motion.X_WB};
+    const bool moved = pair->is_fixed() ? pair->scene().has_moving_obstacles() && then_s != time_s_
+                                        : !same_bits(other.start, other.end);
+    const BodyPath tool = {X_WT, X_WT};
+    if (!moved || !pair->is_near(tool, other)) return true;
+    const SweepQuery::SweepResult found =
+        pair->sweep(tool, other, kMinClearance * kClearance_m, budget, {then_s, time_s_});
+    return found.complete && !found.overlaps && found.contacts.empty();
+  });
+}
+
 /// Nothing moves, bodies and obstacles: the poses at the start are admissible together.
-void BodyWorld::hold_all(double dt_s) noexcept {
+void BodyWorld::hold_all() noexcept {
   for (Body& body : bodies_) {
     body.X_WQ = body.X_goal = body.motion.X_WB;
     body.free = body.motion;
     body.free.velocity_W_m_per_s.setZero();
     body.free.spin_W.setZero();
   }
-  move_contacts(time_s_ + dt_s, time_s_);
+  move_contacts(until_s_, time_s_);
   for (BodyContact& contact : contacts_) {
     contact.force_W_N.setZero();
     contact.obstacle_motion = {};
   }
 }
 
-/// Applies the impulses of all contacts to the motions without contact, METHOD (109).
+/// Applies the impulses of all contacts to the motions without contact, METHOD (109), and adds up the work on
+/// the tool, METHOD (111).
 void BodyWorld::apply_impulses() noexcept {
+  work_on_tool_J_ = 0.0;
   for (BodyContact& c : contacts_) {
+    if (bodies_[c.a].asleep) continue;
     const ContactGeometry at = acting_geometry(c);
+    c.point_W_m = at.point_W_m;
+    c.normal_W = at.n_W;
     c.slip_m = slip_m(c, at).norm();
+    if (c.a == 0)
+      work_on_tool_J_ += 0.5 * (c.last_force_W_N + c.force_W_N).dot(other_displacement_m(c, at.point_W_m));
     const auto push = [&](std::size_t i, double sign) {
       if (i == BodyContact::kFixed || i == 0) return;
       Body& body = bodies_[i];
@@ -497,14 +607,18 @@ void BodyWorld::apply_impulses() noexcept {
 }
 
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.
-void BodyWorld::prefetch(double dt_s) noexcept {
+void BodyWorld::prefetch() noexcept {
+  const auto still = [&](std::size_t i) { return i == BodyContact::kFixed || bodies_[i].asleep; };
   for (const auto& pair : pairs_) {
     if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
+    if (still(pair->a()) && still(pair->b()) && !pair->scene().has_moving_obstacles()) continue;
     const auto next = [&](std::size_t i) {
       if (i == BodyContact::kFixed) return BodyPath{};
       const BodyMotion& motion = bodies_[i].motion;
-      return BodyPath{motion.X_WB, i == 0 ? bodies_[0].X_goal
-                                          : moved_freely(bodies_[i].M, motion, bodies_[i].forces, dt_s).X_WB};
+      if (bodies_[i].asleep) return BodyPath{motion.X_WB, motion.X_WB};
+      return BodyPath{motion.X_WB, i == 0
+                                       ? bodies_[0].X_goal
+                                       : moved_freely(bodies_[i].M, motion, bodies_[i].forces, dt_s_).X_WB};
     };
     const BodyPath path_a = next(pair->a()), path_b = next(pair->b());
     if (pair->is_near(path_a, path_b)) pair->prefetch(path_a, path_b, time_s_, budget_);

@@ -11,23 +11,12 @@
 
 #include "collision/bodies/body_contact.hpp"
 #include "collision/bodies/body_pair.hpp"
+#include "collision/bodies/free_body.hpp"
 #include "collision/scene.hpp"
-#include "collision/tool_body.hpp"
 #include "core/cone_projection.hpp"
 #include "core/free_motion.hpp"
 
 namespace wrenchd {
-
-/// A rigid body that moves by itself. B: body frame, parallel to the frame of the mesh file, with its origin
-/// at the centre of mass.
-struct FreeBody {
-  std::string name;
-  ToolBody body;      ///< its mesh and inertia
-  BodyMotion motion;  ///< state at the start
-  double friction = 0.5;
-  double linear_damping_per_s = 0.0;
-  double angular_damping_per_s = 0.0;
-};
 
 /// The tool, free bodies and fixed obstacles as one system: one step is the projection of core/METHOD.md,
 /// section 15, of the hand's pose and of the motions without contact onto the poses in which nothing
@@ -36,6 +25,9 @@ struct FreeBody {
 /// Body 0 is the tool. It takes part in steps with a hand; free bodies are 1, 2, ... No step ends with an
 /// overlap, and no body passes through another. If the work limit of a step is reached, bodies stay where
 /// they were.
+///
+/// A body at rest falls asleep with all bodies that a chain of contacts connects it to, unless the tool or an
+/// obstacle that moves is among them. It wakes when something touches one of them.
 ///
 /// The constructor allocates all memory. One object serves one thread.
 class BodyWorld {
@@ -47,6 +39,7 @@ class BodyWorld {
   struct Settings {
     Vector3d gravity_W_m_per_s2 = {0.0, 0.0, -9.81};
     double tool_friction = 0.0;
+    bool sleeps = true;                   ///< bodies at rest cost nothing until something touches them
     std::uint32_t rounds = 24;            ///< rounds of solving and sweeping per step
     std::uint32_t node_visits = 400'000;  ///< work limit of all sweeps of a step [node visits]
   };
@@ -68,8 +61,20 @@ class BodyWorld {
   /// Places a body. Its pose must be admissible. RT-safe.
   void place(std::size_t body, const BodyMotion& motion) noexcept;
 
-  /// Moves all bodies for dt_s [s]. Without a hand the tool takes no part. RT-safe.
-  Status step(const std::optional<Hand>& hand, double dt_s) noexcept;
+  /// Moves all bodies for dt_s [s], and the obstacles that move to their poses at scene time until_s [s].
+  /// Without a hand the tool takes no part. RT-safe.
+  Status step(const std::optional<Hand>& hand, double dt_s, double until_s) noexcept;
+  Status step(const std::optional<Hand>& hand, double dt_s) noexcept {
+    return step(hand, dt_s, time_s_ + dt_s);
+  }
+  /// Undoes the last step. The next step then is another attempt at the same one. RT-safe.
+  void take_back() noexcept;
+  /// Sets the scene time of the obstacle poses at the start of the next step. RT-safe.
+  void set_time(double time_s) noexcept { time_s_ = time_s; }
+
+  /// True if the tool may enter at X_WT. It was admissible there with the bodies at X_WB_then and the
+  /// obstacles at then_s; nothing has moved into it since. RT-safe.
+  bool admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s) noexcept;
 
   std::size_t body_count() const noexcept { return bodies_.size(); }  ///< with the tool
   const BodyMotion& motion(std::size_t body) const noexcept { return bodies_[body].motion; }
@@ -79,8 +84,13 @@ class BodyWorld {
   std::span<const BodyContact> contacts() const noexcept { return contacts_; }
   /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
   double time_s() const noexcept { return time_s_; }
-  /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
+  /// Largest displacement of a point by the last Newton step [m]; 1e-10 or less if it converged.
   double last_change_m() const noexcept { return last_change_m_; }
+  /// Work of bodies and moving obstacles on the tool in the last step [J]: METHOD (111).
+  double work_on_tool_J() const noexcept { return work_on_tool_J_; }
+  /// The tool and the obstacles or the body of a contact, as the features of contact.contact number them.
+  const Scene& scene_of(const BodyContact& contact) const noexcept { return pair_of(contact).scene(); }
+  bool asleep(std::size_t body) const noexcept { return bodies_[body].asleep; }
   std::uint32_t rounds() const noexcept { return rounds_; }  ///< of the last step
   std::uint32_t node_visits() const noexcept { return settings_.node_visits - budget_.remaining; }
   /// Kinetic and potential energy of the free bodies [J]; the height of the world's origin has none. RT-safe.
@@ -104,49 +114,68 @@ class BodyWorld {
     std::size_t island = 0;                ///< number of the body that represents its island
     bool touches = false;                  ///< has a contact
     bool solved = false;                   ///< q is the answer for the present contacts
+    bool asleep = false;                   ///< rests until something touches its island
+    std::uint16_t calm_steps = 0;          ///< consecutive steps in which it hardly moved
     std::size_t block = 0;                 ///< number of the body in the problem of its island
     Matrix3d root = Matrix3d::Identity();  ///< root of the rotational part of the metric
   };
 
   enum class Slip : std::uint8_t { none, last_step, last_iterate };
 
-  void begin(const std::optional<Hand>& hand, double dt_s) noexcept;
-  void set_goal(Body& body, double dt_s) noexcept;
+  void begin(const std::optional<Hand>& hand) noexcept;
+  void set_goal(Body& body) noexcept;
   void move_contacts(double from_s, double to_s) noexcept;
   void find_islands() noexcept;
   std::size_t root_of(std::size_t body) noexcept;
-  void solve_islands(double dt_s) noexcept;
+  void solve_islands() noexcept;
   void solve_island(std::size_t island) noexcept;
-  bool newton_step(Slip slip, bool starts_with_last) noexcept;
+  const BodyPair& pair_of(const BodyContact& contact) const noexcept;
+  bool newton_step(Slip slip) noexcept;
   FrictionCone cone_of(const BodyContact& contact, Slip slip) const noexcept;
+  Vector3d displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept;
+  Vector3d other_displacement_m(const BodyContact& contact, const Vector3d& point_W_m) const noexcept;
   Vector3d slip_m(const BodyContact& contact, const ContactGeometry& at) const noexcept;
   ContactGeometry geometry(const BodyContact& contact) const noexcept;
   Pose acting_pose(std::size_t body) const noexcept;
   ContactGeometry acting_geometry(const BodyContact& contact) const noexcept;
   bool admissible(std::size_t island) const noexcept;
   bool takes_part(std::size_t body) const noexcept;
-  bool sweep_pairs(double dt_s) noexcept;
-  bool sweep_pair(BodyPair& pair, double dt_s) noexcept;
+  bool sweep_pairs() noexcept;
+  bool sweep_pair(BodyPair& pair) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
   bool drop_separated() noexcept;
   bool held_open(const BodyPair& pair, const SweepQuery::SweepResult& found) const noexcept;
   void unsolve(std::size_t body) noexcept;
+  void wake(std::size_t body) noexcept;
+  void fall_asleep() noexcept;
   void shorten(const BodyPair& pair) noexcept;
-  void hold_all(double dt_s) noexcept;
+  void hold_all() noexcept;
   void apply_impulses() noexcept;
-  void prefetch(double dt_s) noexcept;
+  void prefetch() noexcept;
   BodyPath path_of(std::size_t body) const noexcept;
 
   Settings settings_;
   std::vector<Body> bodies_;
   std::vector<std::unique_ptr<BodyPair>> pairs_;
   std::vector<BodyContact> contacts_;
+  /// What a step changes of a body.
+  struct BodyState {
+    BodyMotion motion;
+    bool asleep;
+    std::uint16_t calm_steps;
+  };
+  std::vector<BodyState> bodies_before_;      ///< before the last step
+  std::vector<BodyContact> contacts_before_;  ///< before the last step
+  double time_before_s_ = 0.0;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;
   Pose X_WP_;  ///< of the hand
   VisitBudget budget_;
-  double time_s_ = 0.0;
+  double time_s_ = 0.0;   ///< scene time of the obstacle poses
+  double dt_s_ = 0.0;     ///< time that passes for the bodies in the step
+  double until_s_ = 0.0;  ///< scene time of the obstacle poses at the end of the step
+  double work_on_tool_J_ = 0.0;
   double last_change_m_ = 0.0;
   std::uint32_t rounds_ = 0;
 };

@@ -64,7 +64,8 @@ double least_time_s(const ObstacleMotion& motion) {
 
 std::vector<std::string> names_of(const Scene& scene) {
   std::vector<std::string> names;
-  for (std::uint32_t i = 0; i < scene.obstacle_count(); ++i) names.push_back(obstacle_name(scene, i));
+  for (std::uint32_t i = 0; i < scene.obstacle_count() + scene.bodies().size(); ++i)
+    names.push_back(obstacle_name(scene, i));
   return names;
 }
 
@@ -81,6 +82,7 @@ std::string files_fingerprint(const SceneSettings& scene) {
   };
   add_all(mesh_files(scene.tool));
   for (const MeshObstacleSettings& obstacle : scene.meshes) add_all(mesh_files(obstacle));
+  for (const BodySettings& body : scene.bodies) add_all(mesh_files(body.shape));
   return text;
 }
 
@@ -134,6 +136,18 @@ Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& s
   if (built.scene->has_moving_obstacles())
     built.scene = std::make_shared<const Scene>(*built.scene, scene.meshes);
   return built;
+}
+
+/// The bodies of a scene that is built again start at rest where they are now.
+void Reconfigurator::keep_bodies(SceneSettings& scene) {
+  const BodyPoses X_WB = loop_.telemetry().handle_pose().X_WB;
+  if (X_WB.size() != scene.bodies.size()) return;  // the loop still renders another scene
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    BodySettings& body = scene.bodies[i];
+    body.X_WM = X_WB[i] * inverse(scene_->bodies()[i].body.X_MT());
+    body.velocity_m_per_s.setZero();
+    body.spin_rad_per_s.setZero();
+  }
 }
 
 FileScope Reconfigurator::client_scope() const {
@@ -196,6 +210,7 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, now);
+  keep_bodies(scene);
   BuiltScene built = build_scene(scene, *loaded_, scope);
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
   auto rendering = build_rendering(config_.settings, built.scene);
@@ -211,6 +226,7 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
     reject_unknown(name, scene);
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
+  keep_bodies(scene);
   BuiltScene built = build_scene(scene, *loaded_, FileScope());
   auto rendering = build_rendering(config_.settings, built.scene);
   std::string text = scene_text(scene, scene_time_s());

@@ -162,6 +162,7 @@ class Reconfigurator {
     BuiltScene built;
   };
 
+  void keep_bodies(SceneSettings& scene);
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
   static BuiltScene build_scene(const SceneSettings& scene, MeshLoader meshes, const FileScope& scope);

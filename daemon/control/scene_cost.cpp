@@ -37,6 +37,8 @@ Costs costs(const SceneSettings& scene) {
   all[scene.tool.mesh] = triangles(scene.tool.mesh, scene.tool.generated);
   for (const MeshObstacleSettings& obstacle : scene.meshes)
     all[obstacle.mesh] = triangles(obstacle.mesh, obstacle.generated);
+  for (const BodySettings& body : scene.bodies)
+    all[body.shape.mesh] = triangles(body.shape.mesh, body.shape.generated);
   return all;
 }
 

@@ -71,6 +71,10 @@ SceneGeometry::SceneGeometry(std::shared_ptr<const Scene> scene) : scene_(std::m
     meshes_.push_back(obstacle.mesh.get());
     all.push_back(&obstacle.mesh->loaded_mesh());
   }
+  for (const FreeBody& body : scene_->bodies()) {
+    meshes_.push_back(body.mesh.get());
+    all.push_back(&body.body.mesh);
+  }
   for (const TriangleMesh* mesh : all) {
     const std::size_t vertices = mesh->vertices_m.size(), triangles = mesh->triangles.size();
     layouts_.push_back({vertices, bytes_, triangles, bytes_ + 12 * vertices});
@@ -108,6 +112,8 @@ bool SceneGeometry::matches(const Scene& scene) const {
   if (&scene == scene_.get()) return true;
   return std::all_of(scene.meshes().begin(), scene.meshes().end(),
                      [this](const MeshObstacle& one) { return mesh_number(one.mesh.get()) != 0; }) &&
+         std::all_of(scene.bodies().begin(), scene.bodies().end(),
+                     [this](const FreeBody& one) { return mesh_number(one.mesh.get()) != 0; }) &&
          same(scene.tool().mesh, scene_->tool().mesh);
 }
 
@@ -141,7 +147,15 @@ Json SceneGeometry::description(const Scene& scene) const {
                                {"motion", json_of(one.scheduled->motion)}};
     obstacles.push_back(std::move(obstacle));
   }
-  return {{"bytes", bytes_}, {"meshes", meshes}, {"tool", {{"mesh", 0}}}, {"obstacles", obstacles}};
+  Json bodies = Json::array();
+  for (const FreeBody& one : scene.bodies())
+    bodies.push_back(
+        {{"name", one.name}, {"mesh", mesh_number(one.mesh.get())}, {"X_WB", pose_json(one.motion.X_WB)}});
+  return {{"bytes", bytes_},
+          {"meshes", meshes},
+          {"tool", {{"mesh", 0}}},
+          {"obstacles", obstacles},
+          {"bodies", bodies}};
 }
 
 }  // namespace wrenchd

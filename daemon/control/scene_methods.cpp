@@ -151,6 +151,13 @@ Json scene_json(Reconfigurator& reconfigurator) {
                          {"rotation_vector_rad", json_of(rotation_vector(X_WM.rotation))},
                          {"moves", obstacle.motion.moves() || obstacle.scheduled.has_value()}});
   }
+  Json bodies = Json::array();
+  for (const BodySettings& body : scene.bodies)
+    bodies.push_back({{"name", body.name},
+                      {"mesh", body.shape.mesh.string()},
+                      {"kind", kind(body.shape.kind)},
+                      {"scale", body.shape.scale},
+                      {"friction", body.friction}});
   return {{"file", scene.file.string()},
           {"tool",
            {{"mesh", scene.tool.mesh.string()},
@@ -158,6 +165,7 @@ Json scene_json(Reconfigurator& reconfigurator) {
             {"scale", scene.tool.scale},
             {"mass", scene.tool.mass_kg}}},
           {"obstacles", obstacles},
+          {"bodies", bodies},
           {"rendering_id", present->rendering_id}};
 }
 

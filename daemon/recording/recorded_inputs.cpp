@@ -124,6 +124,10 @@ SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory)
       for (TomlNode& obstacle : *list)
         if (find(obstacle, "mesh") != nullptr || find(obstacle, "meshes") != nullptr)
           put_mesh(obstacle, header, "obstacle_" + std::to_string(number++), directory);
+  number = 0;
+  if (TomlEntry* const bodies = find(tree, "body"))
+    if (auto* list = std::get_if<TomlNode::Array>(&bodies->node.value))
+      for (TomlNode& body : *list) put_mesh(body, header, "body_" + std::to_string(number++), directory);
   return load_scene(tree, header.scene_file);
 }
 
@@ -185,6 +189,8 @@ void add_meshes(const SceneSettings& scene, const MeshLoader& loaded, RecordingH
   add_all("tool", mesh_files(scene.tool));
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)
     add_all("obstacle_" + std::to_string(i), mesh_files(scene.meshes[i]));
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    add_all("body_" + std::to_string(i), mesh_files(scene.bodies[i].shape));
 }
 
 void set_start_time(const Clock& clock, RecordingHeader& header) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <ctime>
+#include <string_view>
 #include <utility>
 
 #include <hdf5.h>
@@ -33,6 +34,10 @@ constexpr hsize_t kMaxChunkBytes = hsize_t{64} << 20;
 constexpr std::size_t kMaxNames = 10'000;
 /// Rows that are read and sent together.
 constexpr hsize_t kPieceRows = 4 * RecordingWriter::kChunkTicks;
+
+/// Columns of /ticks that a recording of this format may lack, because it is older. Their values are zeros
+/// then.
+constexpr std::array<std::string_view, 1> kLaterFields = {"X_WB"};
 
 constexpr std::array kContactRangeFields = {
     RecordField{"first_contact", FieldType::u64, 1, offsetof(TickRow, first_contact), "1", "",
@@ -246,7 +251,7 @@ void write_mesh(hid_t group, const RecordedFile& mesh) {
 }
 
 bool is_mesh(const std::string& role) {
-  return role == "tool" || role.starts_with("obstacle_");
+  return role == "tool" || role.starts_with("obstacle_") || role.starts_with("body_");
 }
 
 std::string utc(std::int64_t unix_ns) {
@@ -607,6 +612,8 @@ void check_columns(const TableKind& table, hid_t set) {
   for (const RecordField& field : table.fields) {
     const int index = H5Tget_member_index(type, field.name);
     const std::string column = "column '" + std::string(field.name) + "' of table '" + table.name + "' ";
+    const bool later = std::find(kLaterFields.begin(), kLaterFields.end(), field.name) != kLaterFields.end();
+    if (index < 0 && later) continue;
     if (index < 0) reject(column + "is missing; the file was changed, take it as it was recorded");
     const Handle member(H5Tget_member_type(type, static_cast<unsigned>(index)), H5Tclose);
     const H5T_class_t kind = H5Tget_class(member);

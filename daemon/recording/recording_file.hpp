@@ -77,7 +77,7 @@ struct RecordBatch {
 ///   /fields     description of the columns of the tables: table, name, type, count, unit, frame, meaning,
 ///               names of the values
 ///   /config     texts: settings, scene, profile, hand_script, parents of the profile
-///   /meshes     contents of the mesh files tool, obstacle_0, ..., with path and SHA-256
+///   /meshes     contents of the mesh files tool, obstacle_0, ..., body_0, ..., with path and SHA-256
 ///
 /// Unit, frame and meaning of column X are also the attributes "X.unit", "X.frame" and "X.doc" of its table.
 /// Attributes of the file: format, versions, rate, and start time on the clock of the ticks and in UTC.

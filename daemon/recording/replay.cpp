@@ -50,7 +50,7 @@ class RecordedProxyInitializer final : public ProxyInitializer {
   bool take_result(ProxyInitializationResult& result) noexcept override {
     const auto initialization = static_cast<ProxyInitialization>(record_->proxy_initialization);
     result = {request_.id, initialization == ProxyInitialization::found, pose_from_numbers(record_->X_WQ),
-              request_.scene_time_s};
+              request_.scene_time_s, request_.X_WB};
     return initialization == ProxyInitialization::found || initialization == ProxyInitialization::failed;
   }
 
@@ -131,6 +131,7 @@ static_assert(kFaultCount < 53);
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
   if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
   if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
+  if (auto d = compare(then.tick, "X_WB", then.X_WB, now.X_WB)) return d;
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
@@ -146,7 +147,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
 
 const char* compared_fields() {
   static const std::string names = [] {
-    std::string text = "X_WP, X_WQ, eps, F_T, F_out";
+    std::string text = "X_WP, X_WQ, X_WB, eps, F_T, F_out";
     for (const Compared& number : kNumbers) text += std::string(", ") + number.name;
     return text;
   }();

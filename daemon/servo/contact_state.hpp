@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "collision/bodies/body_proxy.hpp"
 #include "collision/penetration.hpp"
 #include "core/pose.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
@@ -19,6 +20,7 @@ struct ContactState {
   bool proxy_valid =
       false;  ///< The proxy is at a feasible pose, or was found at one and follows from the next tick on.
   ProxyInitialization initialization = ProxyInitialization::searching;
+  BodyPoses X_WB;                   ///< Poses of the free bodies of the scene.
   Vector6d eps = Vector6d::Zero();  ///< log(p^-1 q), Eq. (15) [m, rad].
   double energy = 0.0;              ///< T(p, q) of Eq. (8) [kg m^2].
   double kkt_residual = 0.0;

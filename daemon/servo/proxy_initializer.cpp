@@ -3,6 +3,8 @@
 
 #include <chrono>
 
+#include "collision/bodies/body_placement.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -18,13 +20,6 @@ PenetrationDepth::Options search_options(ContactBackend contacts) {
   options.clearance_m = Proxy::kClearance_m;
   options.contacts = contacts;
   return options;
-}
-
-ProxyInitializationResult find_feasible_pose(PenetrationDepth& penetration,
-                                             const ProxyInitializationRequest& request,
-                                             const std::stop_token& stop) noexcept {
-  const Projection q = penetration.query(request.X_WP, stop, request.scene_time_s).projection;
-  return {request.id, q.status != ProjectionStatus::infeasible, q.X_WQ, request.scene_time_s};
 }
 
 }  // namespace
@@ -43,15 +38,31 @@ const char* name(ProxyInitialization progress) noexcept {
   return "unknown";
 }
 
+ProxySearch::ProxySearch(const Scene& scene, ContactBackend contacts)
+    : scene_(scene), contacts_(contacts), penetration_(scene, search_options(contacts)) {}
+
+/// The bodies stand still in the search, so they are obstacles.
+ProxyInitializationResult ProxySearch::find(const ProxyInitializationRequest& request,
+                                            const std::stop_token& stop) {
+  const auto query = [&](PenetrationDepth& penetration) {
+    const Projection q = penetration.query(request.X_WP, stop, request.scene_time_s).projection;
+    return ProxyInitializationResult{request.id, q.status != ProjectionStatus::infeasible, q.X_WQ,
+                                     request.scene_time_s, request.X_WB};
+  };
+  if (request.X_WB.empty()) return query(penetration_);
+  const Scene obstacles = with_bodies_as_obstacles(scene_, {request.X_WB.begin(), request.X_WB.size()});
+  PenetrationDepth among_bodies(obstacles, search_options(contacts_));
+  return query(among_bodies);
+}
+
 BackgroundProxyInitializer::BackgroundProxyInitializer(const Scene& scene, ContactBackend contacts)
-    : penetration_(scene, search_options(contacts)),
-      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+    : search_(scene, contacts), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void BackgroundProxyInitializer::run(const std::stop_token& stop) noexcept {
   ProxyInitializationRequest request;
   while (!stop.stop_requested()) {
     if (request_.read(request))
-      result_.write(find_feasible_pose(penetration_, request, stop));
+      result_.write(search_.find(request, stop));
     else
       std::this_thread::sleep_for(kPollInterval);
   }
@@ -71,7 +82,7 @@ std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const S
 }
 
 InTickProxyInitializer::InTickProxyInitializer(const Scene& scene, ContactBackend contacts)
-    : penetration_(scene, search_options(contacts)) {}
+    : search_(scene, contacts) {}
 
 void InTickProxyInitializer::request(const ProxyInitializationRequest& request) noexcept {
   request_ = request;
@@ -81,7 +92,7 @@ void InTickProxyInitializer::request(const ProxyInitializationRequest& request) 
 bool InTickProxyInitializer::take_result(ProxyInitializationResult& result) noexcept {
   if (!request_pending_) return false;
   request_pending_ = false;
-  result = find_feasible_pose(penetration_, request_, {});
+  result = search_.find(request_, {});
   return true;
 }
 

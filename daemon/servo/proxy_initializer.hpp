@@ -5,6 +5,7 @@
 #include <memory>
 #include <thread>
 
+#include "collision/bodies/body_proxy.hpp"
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
 #include "core/contact_backend.hpp"
@@ -30,6 +31,7 @@ struct ProxyInitializationRequest {
   std::uint32_t id = 0;       ///< Number of the request; the result repeats it.
   Pose X_WP;                  ///< Commanded pose p of the tool body.
   double scene_time_s = 0.0;  ///< Scene time at which the search places the obstacles.
+  BodyPoses X_WB = {};        ///< Poses at which the search places the bodies of the scene.
 };
 
 /// Result of one request.
@@ -38,6 +40,23 @@ struct ProxyInitializationResult {
   bool found = false;         ///< False if no feasible pose was found; X_WQ is then not set.
   Pose X_WQ;                  ///< Feasible pose of the tool body.
   double scene_time_s = 0.0;  ///< Scene time at which X_WQ is feasible; equals that of the request.
+  BodyPoses X_WB = {};        ///< Poses of the bodies with which X_WQ is feasible; those of the request.
+};
+
+/// Searches the feasible pose nearest to a commanded pose.
+class ProxySearch {
+ public:
+  /// Keeps a reference to `scene`, which must outlive this object. Not RT-safe: allocates.
+  ProxySearch(const Scene& scene, ContactBackend contacts);
+
+  /// Not RT-safe: takes milliseconds, and seconds inside a fine mesh. In a scene with bodies it allocates. A
+  /// stop request ends it within a few milliseconds.
+  ProxyInitializationResult find(const ProxyInitializationRequest& request, const std::stop_token& stop);
+
+ private:
+  const Scene& scene_;
+  ContactBackend contacts_;
+  PenetrationDepth penetration_;
 };
 
 /// Searches for a feasible pose from which the proxy can follow the hand. The rendering uses it after start,
@@ -76,7 +95,7 @@ class BackgroundProxyInitializer final : public ProxyInitializer {
  private:
   void run(const std::stop_token& stop) noexcept;
 
-  PenetrationDepth penetration_;  ///< Used by the search thread only.
+  ProxySearch search_;  ///< Used by the search thread only.
   LatestValue<ProxyInitializationRequest> request_;
   LatestValue<ProxyInitializationResult> result_;
   std::jthread thread_;  ///< Declared last, because the thread uses all other members.
@@ -90,12 +109,12 @@ class InTickProxyInitializer final : public ProxyInitializer {
 
   /// RT-safe.
   void request(const ProxyInitializationRequest& request) noexcept override;
-  /// Neither allocates nor locks, unless CGAL detects the contacts. Not RT-safe: takes milliseconds, and
-  /// seconds inside a fine mesh.
+  /// Neither allocates nor locks, unless CGAL detects the contacts or the scene has bodies. Not RT-safe:
+  /// takes milliseconds, and seconds inside a fine mesh.
   bool take_result(ProxyInitializationResult& result) noexcept override;
 
  private:
-  PenetrationDepth penetration_;
+  ProxySearch search_;
   ProxyInitializationRequest request_;
   bool request_pending_ = false;
 };

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bit>
+#include <tuple>
 #include <type_traits>
 
 #include "collision/touch.hpp"
@@ -68,6 +69,15 @@ constexpr Unit scalar(const char* text) {
 
 constexpr std::array<FieldComponent, 7> kPoseComponents = {
     {{"px", "m"}, {"py", "m"}, {"pz", "m"}, {"qx", "1"}, {"qy", "1"}, {"qz", "1"}, {"qw", "1"}}};
+#define WRENCHD_BODY(i)                                                                           \
+  {"body" #i ".px", "m"}, {"body" #i ".py", "m"}, {"body" #i ".pz", "m"}, {"body" #i ".qx", "1"}, \
+      {"body" #i ".qy", "1"}, {"body" #i ".qz", "1"}, {                                           \
+    "body" #i ".qw", "1"                                                                          \
+  }
+constexpr std::array<FieldComponent, std::tuple_size_v<TickRecord::BodyNumbers>> kBodyPoseComponents = {
+    {WRENCHD_BODY(0), WRENCHD_BODY(1), WRENCHD_BODY(2), WRENCHD_BODY(3), WRENCHD_BODY(4), WRENCHD_BODY(5),
+     WRENCHD_BODY(6), WRENCHD_BODY(7)}};
+#undef WRENCHD_BODY
 constexpr std::array<FieldComponent, 6> kWrenchComponents = {
     {{"fx", "N"}, {"fy", "N"}, {"fz", "N"}, {"tx", "N.m"}, {"ty", "N.m"}, {"tz", "N.m"}}};
 constexpr std::array<FieldComponent, 6> kTwistComponents = {
@@ -78,6 +88,7 @@ constexpr std::array<FieldComponent, kStageCount> kStageComponents = {
     {{"read", "ns"}, {"projection", "ns"}, {"wrench", "ns"}, {"limits", "ns"}, {"write", "ns"}}};
 
 constexpr Unit kPose = {"m m m, qx qy qz qw", kPoseComponents};
+constexpr Unit kBodyPoses = {"m m m, qx qy qz qw, of each body", kBodyPoseComponents};
 constexpr Unit kWrench = {"N x3, N.m x3", kWrenchComponents};
 constexpr Unit kTwist = {"m/s x3, rad/s x3", kTwistComponents};
 constexpr Unit kDisplacement = {"m x3, rad x3", kDisplacementComponents};

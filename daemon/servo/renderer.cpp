@@ -208,6 +208,7 @@ ContactState Renderer::contact() const noexcept {
   c.X_WQ = rendering.X_WQ();
   c.proxy_valid = rendering.proxy_valid();
   c.initialization = rendering.proxy_initialization();
+  c.X_WB = rendering.X_WB();
   c.eps = depth.eps;
   c.energy = depth.projection.energy;
   c.kkt_residual = depth.projection.kkt_residual;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <stdexcept>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -20,6 +21,26 @@ constexpr Duration kRetryDelay = std::chrono::milliseconds(100);
 /// Time limit of a warm-up, and the number of ticks that it executes.
 constexpr auto kWarmUpLimit = std::chrono::milliseconds(50);
 constexpr int kWarmUpTicks = 30;
+
+/// The bodies feel the spring of the energy law, whose wrench is the gradient of what the projection
+/// minimizes.
+void require_support_for_bodies(const Scene& scene, const Settings& settings) {
+  if (scene.bodies().empty()) return;
+  if (settings.rendering.method != Method::exact)
+    throw std::invalid_argument(
+        "the scene has free bodies, and only [rendering] method \"exact\" moves them; choose it, or remove "
+        "the "
+        "[[body]] tables");
+  if (settings.wrench.law != SpringLaw::energy)
+    throw std::invalid_argument(
+        "the scene has free bodies, and only [wrench] law \"energy\" moves them; choose it, or remove the "
+        "[[body]] tables");
+  if (settings.rendering.contacts == ContactBackend::cgal)
+    throw std::invalid_argument(
+        "the scene has free bodies, and only [rendering] contacts \"native\" moves them; choose it, or "
+        "remove "
+        "the [[body]] tables");
+}
 
 /// FNV-1a over 64-bit words.
 class Checksum64 {
@@ -55,6 +76,8 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       penetration_(*scene_, {settings.rendering.method, settings.rendering.planes, 0.0,
                              settings.rendering.friction, Proxy::WorkLimit{}, settings.rendering.contacts}),
       law_(gains_) {
+  require_support_for_bodies(*scene_, settings);
+  if (!scene_->bodies().empty()) bodies_.emplace(*scene_, settings.rendering.friction.dynamic_coefficient);
   invalidate_proxy();
 }
 
@@ -74,6 +97,11 @@ void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
     X_WQ = depth.projection.X_WQ;
     law_.update(depth.spring_displacement, depth.contacts > 0, 1e-3);
   }
+  if (bodies_) {
+    for (int tick = 0; tick < kWarmUpTicks && !stop.stop_requested(); ++tick)
+      bodies_->move_without_tool(scene_time_s + 1e-3 * tick);
+    bodies_->restart(scene_time_s);
+  }
   checksum();
   invalidate_proxy();
 }
@@ -83,7 +111,14 @@ void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
 bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
   X_WP_ = X_WH * X_HT_;
   if (!proxy_valid()) {
+    if (bodies_) bodies_->move_without_tool(scene_time_s);
     initialize_proxy(now, scene_time_s);
+    return true;
+  }
+  if (bodies_) {
+    depth_ = follow_among_bodies(scene_time_s);
+    X_WQ_ = depth_.projection.X_WQ;
+    proxy_initialization_ = ProxyInitialization::complete;
     return true;
   }
   const double since_s =
@@ -99,12 +134,33 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
   return true;
 }
 
+/// The first answer of a proxy has no work: the contacts have no force before it.
+Penetration Rendering::follow_among_bodies(double scene_time_s) noexcept {
+  const bool first = proxy_initialization_ != ProxyInitialization::complete;
+  constexpr double kLeastStiffness_per_s2 = 1.0;  // a spring that is scaled to nothing still leads the tool
+  const Penetration depth = bodies_->follow(
+      X_WP_, std::max(spring_scale_ * energy_stiffness_per_s2_, kLeastStiffness_per_s2), scene_time_s);
+  obstacle_work_kg_m2_ = first ? 0.0 : bodies_->work_kg_m2();
+  scene_time_s_ = scene_time_s;
+  return depth;
+}
+
+void Rendering::adopt_bodies(const Rendering& other) noexcept {
+  if (bodies_ && other.bodies_ && scene_->shares_bodies_with(*other.scene_)) bodies_->adopt(*other.bodies_);
+}
+
 bool Rendering::move(const Pose& X_WH) noexcept {
   X_WP_before_ = X_WP_;
   X_WQ_before_ = X_WQ_;
   depth_before_ = depth_;
   X_WP_ = X_WH * X_HT_;
   if (proxy_initialization_ != ProxyInitialization::complete) return true;
+  if (bodies_) {
+    depth_ = bodies_->follow_again(X_WP_);
+    obstacle_work_kg_m2_ = bodies_->work_kg_m2();
+    X_WQ_ = depth_.projection.X_WQ;
+    return true;
+  }
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
   if (scene_->has_moving_obstacles() && depth_.projection.status == ProjectionStatus::infeasible)
     return false;
@@ -115,6 +171,12 @@ bool Rendering::move(const Pose& X_WH) noexcept {
 void Rendering::undo_move() noexcept {
   X_WP_ = X_WP_before_;
   X_WQ_ = X_WQ_before_;
+  if (bodies_) {
+    depth_ = bodies_->follow_again(X_WP_);
+    obstacle_work_kg_m2_ = bodies_->work_kg_m2();
+    X_WQ_ = depth_.projection.X_WQ;
+    return;
+  }
   depth_ = depth_before_;
   penetration_.discard_contacts();
 }
@@ -142,7 +204,8 @@ void Rendering::initialize_proxy(TimePoint now, double scene_time_s) noexcept {
   if (!request_pending_) {
     if (proxy_initialization_ == ProxyInitialization::failed && now < retry_at_) return;
     proxy_initialization_ = ProxyInitialization::searching;
-    proxy_initializer_->request({++request_id_, has_initial_guess_ ? X_WT_guess_ : X_WP_, scene_time_s});
+    proxy_initializer_->request(
+        {++request_id_, has_initial_guess_ ? X_WT_guess_ : X_WP_, scene_time_s, X_WB()});
     request_pending_ = true;
     return;
   }
@@ -152,6 +215,7 @@ void Rendering::initialize_proxy(TimePoint now, double scene_time_s) noexcept {
   request_pending_ = false;
   starts_in_contact_ = has_initial_guess_;
   has_initial_guess_ = false;
+  if (result.found && bodies_) result.found = bodies_->enter(result.X_WQ, result.X_WB, result.scene_time_s);
   proxy_initialization_ = result.found ? ProxyInitialization::found : ProxyInitialization::failed;
   X_WQ_ = result.X_WQ;
   penetration_.clear_history(result.scene_time_s);
@@ -196,6 +260,7 @@ void Rendering::set_stiffness_scale(const StiffnessScale& scale) noexcept {
 }
 
 Touches Rendering::contacts() const noexcept {
+  if (in_contact() && bodies_) return bodies_->touches();
   return in_contact() ? touches(depth_.projection, *scene_, penetration_.uses_mesh_features()) : Touches{};
 }
 

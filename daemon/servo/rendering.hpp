@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
+#include "collision/bodies/body_proxy.hpp"
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
 #include "collision/touch.hpp"
@@ -25,7 +27,7 @@ namespace wrenchd {
 class Rendering {
  public:
   /// id: number of the rendering in records; 0 is the rendering of the start. Throws std::invalid_argument if
-  /// the method does not support the scene or if the gains give no valid spring. Not RT-safe: allocates.
+  /// method or law do not support the scene or if the gains give no valid spring. Not RT-safe: allocates.
   Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
             std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer);
 
@@ -68,6 +70,10 @@ class Rendering {
   const Pose& X_WQ() const noexcept { return X_WQ_; }
   const Penetration& depth() const noexcept { return depth_; }      ///< Result of project(). RT-safe.
   bool in_contact() const noexcept { return depth_.contacts > 0; }  ///< RT-safe.
+  /// Returns the poses of the free bodies of the scene. RT-safe.
+  BodyPoses X_WB() const noexcept { return bodies_ ? bodies_->poses() : BodyPoses{}; }
+  /// Takes over the motions of the bodies from another rendering of the same bodies. RT-safe.
+  void adopt_bodies(const Rendering& other) noexcept;
   /// Returns the contacts that hold the proxy, at most kMaxTouches. RT-safe.
   Touches contacts() const noexcept;
   const Wrench& F_T() const noexcept { return F_T_; }  ///< Body wrench in axes of T at its origin. RT-safe.
@@ -92,6 +98,7 @@ class Rendering {
 
  private:
   void initialize_proxy(TimePoint now, double scene_time_s) noexcept;
+  Penetration follow_among_bodies(double scene_time_s) noexcept;
 
   // Constant after construction
   std::uint32_t id_;
@@ -105,6 +112,8 @@ class Rendering {
   StabilityAnalysis stability_;
 
   PenetrationDepth penetration_;
+  std::optional<BodyProxy>
+      bodies_;  ///< Follows the hand in a scene with bodies; penetration_ does otherwise.
   WrenchLaw law_;
   LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.

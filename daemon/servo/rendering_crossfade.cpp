@@ -10,6 +10,7 @@ RenderingCrossfade::Change RenderingCrossfade::update(bool driving) noexcept {
     next_.reset(exchange_.take());
     if (!next_) return Change::none;
     next_weight_ = weight_rate_per_s_ = 0.0;
+    next_->adopt_bodies(*active_);
     // The guess keeps the handle pose of the active proxy, and so the tool on its side of each wall.
     if (active_->proxy_valid())
       next_->initialize_near(active_->X_WQ() * inverse(active_->X_HT()) * next_->X_HT());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/servo/telemetry.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace wrenchd {
@@ -45,6 +46,11 @@ void record_contact(const ContactState& contact, TickRecord& record) noexcept {
   record.X_WP = numbers_of(contact.X_WP);
   record.X_WQ.fill(kNotSet);
   if (contact.proxy_valid) record.X_WQ = numbers_of(contact.X_WQ);
+  record.X_WB.fill(0.0);
+  for (std::size_t i = 0; i < contact.X_WB.size(); ++i) {
+    const PoseNumbers X = numbers_of(contact.X_WB[i]);
+    std::copy(X.begin(), X.end(), record.X_WB.begin() + static_cast<std::ptrdiff_t>(X.size() * i));
+  }
   record.eps.fill(kNotSet);
   record.energy = record.kkt_residual = kNotSet;
   if (contact.following()) {
@@ -121,7 +127,8 @@ void Telemetry::publish(const TickResult& tick, const Supervisor& supervisor,
             tick.time.now);
   if (tick.released) events_.emit(tick.time.now, Event::Released{});
   const ContactState& contact = tick.demand.contact;
-  if (tick.demand.sample_usable) handle_pose_.write({contact.X_WH, tick.time.scene_time_s, tick.time.now});
+  if (tick.demand.sample_usable)
+    handle_pose_.write({contact.X_WH, contact.X_WB, tick.time.scene_time_s, tick.time.now});
   show(rendering, contact.crossfading);
 }
 

@@ -21,9 +21,10 @@
 
 namespace wrenchd {
 
-/// Pose of the handle in the world, and when it was there.
+/// Pose of the handle and of the free bodies in the world, and when they were there.
 struct HandlePose {
   Pose X_WH;
+  BodyPoses X_WB = {};
   double scene_time_s = 0.0;
   TimePoint at{};
 };

@@ -16,6 +16,7 @@ namespace wrenchd {
 /// core/README.md, section "Conventions".
 struct TickRecord {
   using PoseNumbers = std::array<double, 7>;
+  using BodyNumbers = std::array<double, 7 * 8>;  ///< Poses of 8 bodies.
   using Numbers6 = std::array<double, 6>;
   using StageNumbers = std::array<std::int64_t, 5>;
 

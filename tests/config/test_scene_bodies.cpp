@@ -79,5 +79,52 @@ TEST_CASE("a body may consist of several meshes", "[scene]") {
   CHECK(rejection(dir, "[tool]\nscale = 1\n").find("'tool.mesh'") != std::string::npos);
 }
 
+TEST_CASE("a scene may have free bodies", "[scene]") {
+  const TemporaryDirectory dir;
+  const std::string tool = "[tool]\nmesh = \"a.stl\"\n";
+  const SceneSettings scene =
+      load(dir, "gravity_m_per_s2 = [0.0, 0.0, -1.62]\n" + tool +
+                    "[[body]]\nname = \"crate\"\nmesh = \"b.stl\"\nscale = 0.001\ndensity_kg_per_m3 = 700.0\n"
+                    "position_m = [0.1, 0.2, 0.3]\nrotation_vector_rad = [0.0, 0.0, 0.5]\n"
+                    "velocity_m_per_s = [1.0, 0.0, 0.0]\nangular_velocity_rad_per_s = [0.0, 2.0, 0.0]\n"
+                    "friction = 0.3\nlinear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\n"
+                    "[[body]]\nmesh = { make = \"gear\" }\nmass = 0.4\n");
+  REQUIRE(scene.bodies.size() == 2);
+  const BodySettings& crate = scene.bodies[0];
+  CHECK(scene.gravity_W_m_per_s2 == Vector3d(0.0, 0.0, -1.62));
+  CHECK(crate.name == "crate");
+  CHECK(crate.density_kg_per_m3 == 700.0);
+  CHECK(crate.X_WM.translation_m == Vector3d(0.1, 0.2, 0.3));
+  CHECK(crate.X_WM.rotation.angularDistance(Quaterniond::Identity()) == Approx(0.5));
+  CHECK(crate.velocity_m_per_s == Vector3d(1.0, 0.0, 0.0));
+  CHECK(crate.spin_rad_per_s == Vector3d(0.0, 2.0, 0.0));
+  CHECK(crate.friction == 0.3);
+  CHECK(crate.linear_damping_per_s == 0.1);
+  CHECK(crate.angular_damping_per_s == 0.2);
+  CHECK(scene.bodies[1].name == "body[1]");
+  CHECK(scene.bodies[1].shape.mass_kg == 0.4);
+  CHECK(load(dir, tool + "[[body]]\nmesh = \"b.stl\"\n").gravity_W_m_per_s2 == Vector3d(0.0, 0.0, -9.81));
+}
+
+TEST_CASE("a free body with an error is rejected with its place and the remedy", "[scene]") {
+  const TemporaryDirectory dir;
+  const std::string tool = "[tool]\nmesh = \"a.stl\"\n", body = "[[body]]\nmesh = \"b.stl\"\n";
+  const auto says = [&](const std::string& text, const std::string& reason) {
+    INFO(text);
+    CHECK_THAT(rejection(dir, text), Catch::Contains(reason));
+  };
+  says(tool + body + "mass = 1.0\ndensity_kg_per_m3 = 700.0\n", "keep one of 'mass' and 'density_kg_per_m3'");
+  says(tool + body + "inertia = \"hull\"\ndensity_kg_per_m3 = 700.0\n", "needs the volume of a solid");
+  says(tool + body + "friction = -0.1\n", "friction");
+  says(tool + body + "velocity_m_per_s = [9.0, 0.0, 0.0]\n", "no more than 5");
+  says(tool + "[[body]]\nmass = 1.0\n", "mesh");
+  says(tool + "[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n",
+       "there is an obstacle or a body 'b' already");
+  says("gravity_m_per_s2 = [0.0, 0.0, -9.81]\n" + tool, "the scene has none; add a [[body]]");
+  std::string nine = tool;
+  for (int i = 0; i < 9; ++i) nine += body;
+  says(nine, "has 9 bodies; a scene may have 8");
+}
+
 }  // namespace
 }  // namespace wrenchd

@@ -72,18 +72,20 @@ TEST_CASE("the answer is the nearest step in all cones", "[cone_projection]") {
     const Cones cones =
         made.cones(bodies, 1 + made.random.bits() % (4 * bodies), k % 4 == 0 ? 0.0 : 0.2 * (k % 5));
     ConeProjection problem(bodies, cones.size());
-    problem.clear(bodies);
     std::vector<Vector6d> z0(bodies);
-    for (std::size_t i = 0; i < bodies; ++i) {
-      z0[i] = made.random.vector<6>();
-      problem.z0(i) = z0[i];
-    }
-    for (const FrictionCone& cone : cones) REQUIRE(problem.add(cone));
-    for (const bool starts_with_last : {false, true}) {
-      INFO("problem " << k << (starts_with_last ? ", again" : ""));
-      REQUIRE(problem.solve(1e-11, starts_with_last) == ConeProjection::Status::optimal);
+    for (Vector6d& one : z0) one = made.random.vector<6>();
+    std::vector<StaticVector<Vector3d, 4>> known(cones.size());
+    for (const bool again : {false, true}) {
+      INFO("problem " << k << (again ? ", again" : ""));
+      problem.clear(bodies);
+      for (std::size_t i = 0; i < bodies; ++i) problem.z0(i) = z0[i];
+      for (const FrictionCone& cone : cones) REQUIRE(problem.add(cone));
+      for (std::size_t i = 0; i < cones.size(); ++i)
+        for (const Vector3d& normal : known[i]) problem.suggest(i, normal);
+      REQUIRE(problem.solve(1e-11) == ConeProjection::Status::optimal);
       check_optimal(problem, cones, z0);
-      if (starts_with_last) CHECK(problem.steps() <= 2);  // the half-spaces of the answer are known
+      if (again) CHECK(problem.steps() <= 2);  // the half-spaces of the answer are known
+      for (std::size_t i = 0; i < cones.size(); ++i) known[i] = problem.active_normals(i);
     }
   }
 }
@@ -131,7 +133,9 @@ TEST_CASE("a solve of cones does not allocate", "[cone_projection]") {
   for (std::size_t i = 0; i < 4; ++i) problem.z0(i).setConstant(-1.0);
   for (const FrictionCone& cone : cones) problem.add(cone);
   problem.solve(1e-11);
-  problem.solve(1e-11, true);
+  for (std::size_t i = 0; i < cones.size(); ++i)
+    for (const Vector3d& normal : problem.active_normals(i)) problem.suggest(i, normal);
+  problem.solve(1e-11);
   CHECK(guard.allocations() == 0);
 }
 

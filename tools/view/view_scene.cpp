@@ -112,6 +112,13 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     obstacles.push_back(std::move(shown));
     ++number;
   }
+  first_body_ = number;
+  for (const Json& one : description.value("bodies", Json::array())) {
+    names_.push_back(one.at("name").get<std::string>());
+    obstacles.push_back(
+        {{"name", names_.back()}, {"mesh", one.at("mesh")}, {"pose", one.at("X_WB")}, {"moves", true}});
+    ++body_count_;
+  }
   Json sizes = Json::array();
   for (const std::size_t triangles : source_triangles_) sizes.push_back({{"triangles", triangles}});
   text_ = Json{{"type", "scene"},        {"shapes", shapes_},
@@ -124,13 +131,18 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
   throw std::runtime_error(std::string("the geometry of the scene: ") + error.what());
 }
 
-Json ViewScene::moving_obstacle_poses(std::int64_t time_ns) const {
+Json ViewScene::moved_poses(std::int64_t time_ns, std::span<const double> X_WB) const {
   const double t_s = 1e-9 * static_cast<double>(time_ns - start_ns_);
   Json out = Json::array();
   for (const MovingObstacle& one : moving_obstacles_) {
     const Pose X_WO = one.later && t_s >= one.later->start_s ? one.later->motion.pose_at(one.later->X_WO, t_s)
                                                              : one.motion.pose_at(one.X_WO, t_s);
     out.push_back({one.number, pose_json(X_WO)});
+  }
+  for (std::size_t i = 0; i < body_count_ && 7 * i + 7 <= X_WB.size(); ++i) {
+    const std::span<const double> pose = X_WB.subspan(7 * i, 7);
+    if (pose[6] == 0.0 && pose[3] == 0.0 && pose[4] == 0.0 && pose[5] == 0.0) continue;  // not recorded
+    out.push_back({first_body_ + i, std::vector<double>(pose.begin(), pose.end())});
   }
   return out;
 }

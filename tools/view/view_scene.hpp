@@ -31,15 +31,16 @@ class ViewScene {
   std::uint64_t shapes() const noexcept { return shapes_; }
   std::uint32_t rendering_id() const noexcept { return rendering_id_; }
 
-  /// Returns {type: "scene", tool, obstacles, ...}: the mesh and pose of tool and obstacles.
+  /// Returns {type: "scene", tool, obstacles, ...}: the mesh and pose of tool, obstacles and bodies.
   const std::string& text() const noexcept { return text_; }
   /// Returns one binary message per mesh, then one per simplified mesh if necessary. Layout: u32: 1 (full) or
   /// 3 (simplified), mesh number, number of vertices, of triangles, of line points; floats: positions and
   /// normals of the vertices; u32: indices of the triangles; floats: line points.
   const std::vector<std::shared_ptr<const std::string>>& meshes() const noexcept { return meshes_; }
 
-  /// Returns the poses of moving obstacles at this time (CLOCK_MONOTONIC): [[number, pose], ...].
-  Json moving_obstacle_poses(std::int64_t time_ns) const;
+  /// Returns the poses of moving obstacles at this time (CLOCK_MONOTONIC) and of the bodies: [[number, pose],
+  /// ...]. Bodies are numbered after the obstacles. X_WB: TickRecord::X_WB.
+  Json moved_poses(std::int64_t time_ns, std::span<const double> X_WB) const;
   std::string obstacle_name(std::uint32_t number) const;
 
   const Pose& X_WB() const noexcept { return X_WB_; }
@@ -62,6 +63,8 @@ class ViewScene {
   std::vector<std::size_t> source_triangles_;  ///< number of triangles of each mesh before simplification
   std::vector<std::string> names_;
   std::vector<MovingObstacle> moving_obstacles_;
+  std::size_t first_body_ = 0;  ///< number of the first body
+  std::size_t body_count_ = 0;
   Pose X_WB_, X_HT_;
   bool about_handle_ = true;
 };

@@ -133,6 +133,7 @@ ViewTick view_tick(const TickRecord& record) {
   tick.X_BH = record.X_BH;
   tick.X_WP = record.X_WP;
   tick.X_WQ = record.X_WQ;
+  tick.X_WB = record.X_WB;
   tick.F_out = record.F_out;
   tick.energy_kg_m2 = record.energy;
   tick.rendering_id = record.rendering_id;
@@ -188,7 +189,7 @@ Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene*
           {"passivity_scale", number(status.passivity_scale)},
           {"limits", status.limits},
           {"proxy_initialization", status.proxy_initialization},
-          {"moved", scene != nullptr ? scene->moving_obstacle_poses(tick.time_ns) : Json::array()}};
+          {"moved", scene != nullptr ? scene->moved_poses(tick.time_ns, tick.X_WB) : Json::array()}};
 }
 
 std::string history_message(const MinMaxHistory& history, std::uint64_t from, std::uint64_t to, bool reset,

@@ -24,6 +24,7 @@ struct ViewTick {
   std::array<double, 7> X_BH{};      ///< Pose of the handle in the device base.
   std::array<double, 7> X_WP{};      ///< Commanded pose p.
   std::array<double, 7> X_WQ{};      ///< Proxy pose q; NaN if the proxy is not valid.
+  TickRecord::BodyNumbers X_WB{};    ///< Poses of the free bodies.
   std::array<double, 6> F_out{};     ///< Wrench sent to the device.
   double energy_kg_m2 = 0.0;         ///< T of Eq. (8); NaN if the proxy is not valid.
   std::uint32_t rendering_id = 0;    ///< Number of the active rendering.

@@ -104,7 +104,7 @@ TEST_CASE("the view reads the scene of the daemon, and moves obstacles by scene 
   CHECK(view.meshes().size() == 2);
   CHECK(view.obstacle_name(2) == "moving");
   CHECK(view.obstacle_name(9) == "obstacle 9");
-  const Json moved = view.moving_obstacle_poses(5'000'000'000 + 2'000'000'000);  // at scene time 2 s
+  const Json moved = view.moved_poses(5'000'000'000 + 2'000'000'000, {});  // at scene time 2 s
   REQUIRE(moved.size() == 1);
   CHECK(moved[0][0] == 2);
   const Pose X_WO = scene->meshes()[1].X_WO_at(2.0);
