@@ -184,7 +184,7 @@ TomlValue read_solid(TomlTable& table, const SceneReading& reading, ToolSettings
   read_body_kind(table.optional("kind"), solid.kind);
   read_inertia(table, solid);
   table.optional("scale", "m").number(solid.scale, kScale);
-  const TomlValue mass = table.optional("mass", "kg");
+  TomlValue mass = table.optional("mass", "kg");
   mass.number(solid.mass_kg, kMass);
   return mass;
 }
@@ -279,21 +279,29 @@ void read_obstacle(TomlTable& table, const SceneReading& reading, const std::str
   if (half_space) reading.scene.half_spaces.push_back(settings);
 }
 
-bool has_name(const SceneSettings& scene, const std::string& name) {
+/// Returns what in the scene has a name: "an obstacle", "a body", or nothing.
+std::string_view owner_of(const SceneSettings& scene, const std::string& name) {
   const auto has_it = [&name](const auto& one) { return one.name == name; };
-  return std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), has_it) ||
-         std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it) ||
-         std::any_of(scene.bodies.begin(), scene.bodies.end(), has_it);
+  if (std::any_of(scene.bodies.begin(), scene.bodies.end(), has_it)) return "a body";
+  const bool obstacle = std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), has_it) ||
+                        std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
+  return obstacle ? "an obstacle" : "";
 }
 
-/// Reads a body that moves by itself. Clients and the page name it, so no obstacle may have its name.
+/// Rejects a name that is taken. Clients and the page name obstacles and bodies.
+void reject_taken(const TomlValue& key, const SceneSettings& scene, const std::string& name) {
+  const std::string_view owner = owner_of(scene, name);
+  if (owner.empty()) return;
+  key.reject("there is " + std::string(owner) + " '" + name +
+             "' already; give this one another name, or remove that one");
+}
+
+/// Reads a body that moves by itself.
 void read_body(TomlTable& table, const SceneReading& reading, const std::string& place) {
   BodySettings body;
   body.name = place;
   const TomlValue name = table.optional("name");
-  name.text(body.name);
-  if (name && has_name(reading.scene, body.name))
-    name.reject("there is an obstacle or a body '" + body.name + "' already; give this one another name");
+  if (name.text(body.name)) reject_taken(name, reading.scene, body.name);
   const TomlValue mass = read_solid(table, reading, body.shape);
   const TomlValue density = table.optional("density_kg_per_m3");
   if (double value = 0.0; density.number(value, kDensity_kg_per_m3)) body.density_kg_per_m3 = value;
@@ -329,7 +337,7 @@ void read_bodies(TomlTable& table, const SceneReading& reading) {
 
 void read_scene(TomlTable& table, const SceneReading& reading) {
   SceneSettings& scene = reading.scene;
-  const TomlValue mass = table.optional("mass", "kg");
+  TomlValue mass = table.optional("mass", "kg");
   table.optional("surface_tolerance_m").number(scene.surface_tolerance_m, kSurfaceTolerance_m);
   table.mandatory("tool").table(read_tool, reading, mass);
   for (const TomlValue& obstacle : table.optional("obstacle").elements("tables, each headed [[obstacle]]")) {
@@ -343,10 +351,10 @@ void read_added(TomlTable& table, const SceneReading& reading) {
   const SceneSettings& scene = reading.scene;
   std::string name;
   const TomlValue key = table.optional("name");
-  if (key.text(name) && has_name(scene, name))
-    key.reject("there is an obstacle or a body '" + name + "' already; give this one another name");
+  if (key.text(name)) reject_taken(key, scene, name);
   for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
-    if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
+    if (const std::string free = "obstacle[" + std::to_string(i) + "]"; owner_of(scene, free).empty())
+      name = free;
   read_obstacle(table, reading, name);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/cone_projection.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,6 +16,37 @@ constexpr double kDependent = 1e-18;
 constexpr double kNoSlip_m = 1e-15;
 /// Steps per dimension and per cone, after which a solve gives up.
 constexpr std::size_t kMaxStepsPerUnknown = 8;
+/// Slip below which a cone counts as sticking in a Newton step [m].
+constexpr double kStick_m = 1e-10;
+/// Steps for the lifts of Coulomb's law.
+constexpr int kLiftSteps = 5;
+/// Least pivot of the equations for the lifts; their diagonal is 1 without coupling.
+constexpr double kLeastPivot = 1e-10;
+/// A Newton step that turns no direction of friction farther than this is the last one [rad].
+constexpr double kTurned_rad = 1e-6;
+constexpr double kMostTurned_rad = 1.0;
+constexpr int kNewtonSteps = 16;
+/// Rounding of a load [N].
+constexpr double kNoLoad_N = 1e-12;
+
+/// Sums of six lanes, which do not wait for each other. size is a multiple of 6.
+double dot(const double* a, const double* b, Eigen::Index size) noexcept {
+  std::array<double, 6> lanes{};
+  for (Eigen::Index i = 0; i < size; i += 6)
+    for (std::size_t l = 0; l < 6; ++l)
+      lanes[l] += a[i + static_cast<Eigen::Index>(l)] * b[i + static_cast<Eigen::Index>(l)];
+  return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + (lanes[4] + lanes[5]);
+}
+
+void rotate(double c, double s, double& a, double& b) noexcept {
+  const double old = a;
+  a = c * old + s * b;
+  b = c * b - s * old;
+}
+
+Eigen::Index at_row(std::size_t i) noexcept {
+  return static_cast<Eigen::Index>(i);
+}
 
 }  // namespace
 
@@ -22,10 +55,16 @@ ConeProjection::ConeProjection(std::size_t max_bodies, std::size_t max_cones) {
   cones_.reserve(max_cones);
   active_.reserve(static_cast<std::size_t>(size) + 1);
   suggested_.reserve(static_cast<std::size_t>(size) + 1);
-  behind_.reserve(static_cast<std::size_t>(size) + 1);
-  for (Eigen::VectorXd* vector : {&z0_, &z_, &rest_, &r_, &d_}) vector->setZero(size);
+  unknowns_.reserve(3 * static_cast<std::size_t>(size));
+  for (Eigen::VectorXd* vector : {&z0_, &z_, &z_before_, &rest_, &r_, &d_}) vector->setZero(size);
   Q_.setZero(size, size);
   R_.setZero(size, size);
+  J_.setZero(3 * size, 3 * size);
+  x_.setZero(3 * size);
+  d_x_.setZero(3 * size);
+  pivots_.resize(3 * static_cast<std::size_t>(size));
+  forces_.reserve(max_cones);
+  left_out_.reserve(max_cones);
 }
 
 void ConeProjection::clear(std::size_t bodies) noexcept {
@@ -48,11 +87,21 @@ bool ConeProjection::add(const FrictionCone& cone) noexcept {
   return true;
 }
 
-Vector3d ConeProjection::displacement(const FrictionCone& cone) const noexcept {
+Vector3d ConeProjection::displacement(const FrictionCone& cone, const Eigen::VectorXd& z) const noexcept {
   Vector3d out = Vector3d::Zero();
-  if (cone.a != FrictionCone::kFixed) out += cone.D_a * z_.segment<kBlock>(at(cone.a));
-  if (cone.b != FrictionCone::kFixed) out += cone.D_b * z_.segment<kBlock>(at(cone.b));
+  if (cone.a != FrictionCone::kFixed) out += cone.D_a * z.segment<kBlock>(at(cone.a));
+  if (cone.b != FrictionCone::kFixed) out += cone.D_b * z.segment<kBlock>(at(cone.b));
   return out;
+}
+
+/// P (D z + slip).
+Vector3d ConeProjection::slip(const FrictionCone& cone) const noexcept {
+  const Vector3d moved = displacement(cone, z_);
+  return moved - cone.n.dot(moved) * cone.n + cone.slip_m;
+}
+
+double ConeProjection::lift_m(std::size_t cone) const noexcept {
+  return cones_[cone].mu > 0.0 ? cones_[cone].mu * slip(cones_[cone]).norm() : 0.0;
 }
 
 /// METHOD (108). direction: unit tangent, or zero for the half-space of the normal alone.
@@ -65,25 +114,25 @@ ConeProjection::HalfSpace ConeProjection::tangent(std::size_t i, const Vector3d&
   if (cone.a != FrictionCone::kFixed) squared += (cone.D_a.transpose() * out.normal).squaredNorm();
   if (cone.b != FrictionCone::kFixed) squared += (cone.D_b.transpose() * out.normal).squaredNorm();
   out.length = std::sqrt(squared);
-  out.bound = (cone.mu * direction.dot(cone.slip_m) - cone.h_m) / out.length;
+  out.bound = bound(out);
   return out;
+}
+
+double ConeProjection::bound(const HalfSpace& half_space) const noexcept {
+  const FrictionCone& cone = cones_[half_space.cone];
+  return ((cone.n - half_space.normal).dot(cone.slip_m) - cone.h_m - cone.s_m) / half_space.length;
 }
 
 /// Returns the product of the scaled normal of a half-space and z.
 double ConeProjection::product(const HalfSpace& half_space, const Eigen::VectorXd& z) const noexcept {
-  const FrictionCone& cone = cones_[half_space.cone];
-  Vector3d moved = Vector3d::Zero();
-  if (cone.a != FrictionCone::kFixed) moved += cone.D_a * z.segment<kBlock>(at(cone.a));
-  if (cone.b != FrictionCone::kFixed) moved += cone.D_b * z.segment<kBlock>(at(cone.b));
-  return half_space.normal.dot(moved) / half_space.length;
+  return half_space.normal.dot(displacement(cones_[half_space.cone], z)) / half_space.length;
 }
 
-/// Adds a multiple of the scaled normal of a half-space to z.
-void ConeProjection::scatter(const HalfSpace& half_space, double factor, Eigen::VectorXd& z) const noexcept {
-  const FrictionCone& cone = cones_[half_space.cone];
-  const Vector3d scaled = factor / half_space.length * half_space.normal;
-  if (cone.a != FrictionCone::kFixed) z.segment<kBlock>(at(cone.a)) += cone.D_a.transpose() * scaled;
-  if (cone.b != FrictionCone::kFixed) z.segment<kBlock>(at(cone.b)) += cone.D_b.transpose() * scaled;
+/// Adds the change of z by a force of a cone.
+void ConeProjection::push(const FrictionCone& cone, const Vector3d& force,
+                          Eigen::VectorXd& z) const noexcept {
+  if (cone.a != FrictionCone::kFixed) z.segment<kBlock>(at(cone.a)) += cone.D_a.transpose() * force;
+  if (cone.b != FrictionCone::kFixed) z.segment<kBlock>(at(cone.b)) += cone.D_b.transpose() * force;
 }
 
 /// Finds the half-space that z violates most, in units of z. Returns false if no cone is violated by more
@@ -92,10 +141,11 @@ bool ConeProjection::most_violated(double tolerance_m, HalfSpace& worst) const n
   double most = 0.0;
   for (std::size_t i = 0; i < cones_.size(); ++i) {
     const FrictionCone& cone = cones_[i];
-    const Vector3d moved = displacement(cone);
-    const Vector3d slip = moved - cone.n.dot(moved) * cone.n + cone.slip_m;
+    const Vector3d moved = displacement(cone, z_);
+    const double normal_m = cone.n.dot(moved);
+    const Vector3d slip = moved - normal_m * cone.n + cone.slip_m;
     const double length = slip.norm();
-    const double violation_m = cone.mu * length - cone.n.dot(moved) - cone.h_m;
+    const double violation_m = cone.mu * length - normal_m - cone.h_m - cone.s_m;
     if (!(violation_m > tolerance_m)) continue;
     const Vector3d direction = length > kNoSlip_m ? Vector3d(slip / length) : Vector3d(Vector3d::Zero());
     const HalfSpace candidate = tangent(i, direction);
@@ -107,29 +157,241 @@ bool ConeProjection::most_violated(double tolerance_m, HalfSpace& worst) const n
 }
 
 ConeProjection::Status ConeProjection::solve(double tolerance_m) noexcept {
-  z_ = z0_;
-  active_.clear();
   steps_ = 0;
   start_with_suggested();
-  const std::size_t max_steps = kMaxStepsPerUnknown * (dimension_ + cones_.size()) + kMaxStepsPerUnknown;
-  Status status = Status::budget_spent;
-  HalfSpace worst;
-  for (; steps_ < max_steps; ++steps_) {
-    if (!most_violated(tolerance_m, worst)) {
-      status = Status::optimal;
-      break;
-    }
-    if (!activate(worst)) {
-      status = Status::infeasible;
-      break;
-    }
-  }
+  const Status status = enter_violated(tolerance_m);
+  take_forces();
   return status;
 }
 
+ConeProjection::Status ConeProjection::solve_coulomb(double tolerance_m) noexcept {
+  steps_ = 0;
+  for (int k = 0; k < kLiftSteps; ++k) {
+    start_with_suggested();
+    const Status status = enter_violated(tolerance_m);
+    take_forces();
+    if (status == Status::infeasible) return status;
+    const bool fits = lifts_fit(tolerance_m);
+    if (fits && !slides()) return status;
+    z_before_.head(static_cast<Eigen::Index>(dimension_)) = z_.head(static_cast<Eigen::Index>(dimension_));
+    if (solve_active() && obeys_coulomb(tolerance_m)) return Status::optimal;
+    if (fits) {
+      z_.head(static_cast<Eigen::Index>(dimension_)) = z_before_.head(static_cast<Eigen::Index>(dimension_));
+      take_forces();
+      return status;
+    }
+    z_.head(static_cast<Eigen::Index>(dimension_)) = z_before_.head(static_cast<Eigen::Index>(dimension_));
+    suggest_active();
+    for (std::size_t i = 0; i < cones_.size(); ++i) cones_[i].s_m = lift_m(i);
+  }
+  return Status::budget_spent;
+}
+
+/// True if the lifts of the cones are those of Coulomb's law at z, to the tolerance.
+bool ConeProjection::lifts_fit(double tolerance_m) const noexcept {
+  for (std::size_t i = 0; i < cones_.size(); ++i)
+    if (!(std::abs(lift_m(i) - cones_[i].s_m) <= tolerance_m)) return false;
+  return true;
+}
+
+/// True if a cone that carries slides. The tolerance of a cone then leaves the direction of the slip open.
+bool ConeProjection::slides() const noexcept {
+  return std::any_of(active_.begin(), active_.end(), [this](const HalfSpace& one) {
+    return cones_[one.cone].mu > 0.0 && slip(cones_[one.cone]).norm() > kStick_m;
+  });
+}
+
+/// Solves Coulomb's law for the active cones. A cone with a negative load is left out. Returns false without
+/// an answer.
+bool ConeProjection::solve_active() noexcept {
+  left_out_.assign(cones_.size(), false);
+  double last_rad = kMostTurned_rad;
+  for (int n = 0; n < kNewtonSteps; ++n) {
+    const double turned_rad = newton_step();
+    if (!(turned_rad < last_rad)) return false;
+    last_rad = turned_rad;
+    if (turned_rad > kTurned_rad) continue;
+    last_rad = kMostTurned_rad;
+    std::size_t worst = cones_.size();
+    double most = -kNoLoad_N;
+    for (std::size_t i = 0; i < cones_.size(); ++i) {
+      const double load = cones_[i].n.dot(forces_[i]);
+      if (load < most) {
+        most = load;
+        worst = i;
+      }
+    }
+    if (worst == cones_.size()) return true;
+    left_out_[worst] = true;
+  }
+  return false;
+}
+
+void ConeProjection::take_forces() noexcept {
+  forces_.assign(cones_.size(), Vector3d::Zero());
+  for (const HalfSpace& one : active_) forces_[one.cone] += one.multiplier / one.length * one.normal;
+}
+
+/// True if z and the forces obey Coulomb's law, to the tolerance.
+bool ConeProjection::obeys_coulomb(double tolerance_m) const noexcept {
+  constexpr double kOutside = 1e-9;  // of the cone, as a coefficient of friction
+  for (std::size_t i = 0; i < cones_.size(); ++i) {
+    const FrictionCone& cone = cones_[i];
+    if (!(cone.n.dot(displacement(cone, z_)) + cone.h_m > -tolerance_m)) return false;
+    const double load = cone.n.dot(forces_[i]);
+    const double most = (cone.mu + kOutside) * std::max(load, 0.0) + kNoLoad_N;
+    if (!(load >= -kNoLoad_N) || !((forces_[i] - load * cone.n).squaredNorm() <= most * most)) return false;
+  }
+  return true;
+}
+
+/// A Newton step for Coulomb's law among the active cones, METHOD (112): an unknown for the load and one for
+/// the direction of friction of each cone that slides, and one for each active half-space of the others,
+/// which stick. Changes z and the forces. Returns the largest angle by which a direction turned [rad].
+double ConeProjection::newton_step() noexcept {
+  ++steps_;
+  set_unknowns();
+  const std::size_t count = unknowns_.size();
+  for (std::size_t j = 0; j < count; ++j) {
+    const Unknown& one = unknowns_[j];
+    for (std::size_t i = 0; i < count; ++i) J_(at_row(i), at_row(j)) = response(unknowns_[i], one);
+    J_(at_row(j), at_row(j)) += one.turn;
+    x_[at_row(j)] = one.target - one.row.dot(displacement(cones_[one.cone], z_));
+  }
+  eliminate(at_row(count));
+  double turned_rad = 0.0;
+  for (std::size_t j = 0; j < count; ++j) {
+    const Unknown& one = unknowns_[j];
+    const double change = x_[at_row(j)];
+    push(cones_[one.cone], change * one.force, z_);
+    forces_[one.cone] += change * one.force;
+    if (one.turn != 0.0) turned_rad = std::max(std::abs(change), turned_rad);
+  }
+  return turned_rad;
+}
+
+/// Sets the unknowns of a Newton step, for forces that have the directions of the present slips; corrects z
+/// for these.
+void ConeProjection::set_unknowns() noexcept {
+  unknowns_.clear();
+  const auto size = static_cast<Eigen::Index>(dimension_);
+  rest_.head(size).setZero();  // change of z
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    const std::size_t i = active_[k].cone;
+    const FrictionCone& cone = cones_[i];
+    if (left_out_[i]) {
+      push(cone, -forces_[i], rest_);
+      forces_[i].setZero();
+      continue;
+    }
+    const bool known = std::any_of(active_.begin(), active_.begin() + static_cast<std::ptrdiff_t>(k),
+                                   [i](const HalfSpace& one) { return one.cone == i; });
+    if (known) continue;
+    const Vector3d slipped = slip(cone);
+    const double length = slipped.norm();
+    if (cone.mu > 0.0 && length <= kStick_m) {
+      const Vector3d t = cone.n.unitOrthogonal();
+      add_unknown(i, cone.n, cone.n, 0.0, -cone.h_m);
+      for (const Vector3d& axis : {t, Vector3d(cone.n.cross(t))})
+        add_unknown(i, axis, axis, 0.0, -axis.dot(cone.slip_m));
+      continue;
+    }
+    const Vector3d d = length > 0.0 ? Vector3d(slipped / length) : Vector3d(Vector3d::Zero());
+    const double load_N = cone.n.dot(forces_[i]);
+    const Vector3d f = cone.n - cone.mu * d;
+    add_unknown(i, f, cone.n, 0.0, -cone.h_m);
+    if (cone.mu > 0.0) {
+      const Vector3d t = cone.n.cross(d);
+      add_unknown(i, -cone.mu * load_N * t, t, -length, -t.dot(cone.slip_m));
+    }
+    push(cone, load_N * f - forces_[i], rest_);
+    forces_[i] = load_N * f;
+  }
+  z_.head(size) += rest_.head(size);
+}
+
+void ConeProjection::add_unknown(std::size_t i, const Vector3d& force, const Vector3d& row, double turn,
+                                 double target) noexcept {
+  const FrictionCone& cone = cones_[i];
+  unknowns_.push_back({i, force, row, cone.D_a.transpose() * force, cone.D_b.transpose() * force,
+                       cone.D_a.transpose() * row, cone.D_b.transpose() * row, turn, target});
+}
+
+/// Change of the left side of the equation of `one` with the unknown `other`, by the displacements.
+double ConeProjection::response(const Unknown& one, const Unknown& other) const noexcept {
+  const FrictionCone &a = cones_[one.cone], &b = cones_[other.cone];
+  double sum = 0.0;
+  if (a.a == b.a && a.a != FrictionCone::kFixed) sum += one.row_a.dot(other.push_a);
+  if (a.a == b.b && a.a != FrictionCone::kFixed) sum += one.row_a.dot(other.push_b);
+  if (a.b == b.a && a.b != FrictionCone::kFixed) sum += one.row_b.dot(other.push_a);
+  if (a.b == b.b && a.b != FrictionCone::kFixed) sum += one.row_b.dot(other.push_b);
+  return sum;
+}
+
+/// Suggests the active half-spaces for the next solve: of a cone that slides, the one of its present
+/// direction.
+void ConeProjection::suggest_active() noexcept {
+  suggested_.clear();
+  for (const HalfSpace& one : active_) {
+    const FrictionCone& cone = cones_[one.cone];
+    const Vector3d slipped = slip(cone);
+    const double length = slipped.norm();
+    if (cone.mu == 0.0 || length <= kStick_m) {
+      suggested_.push_back(one);
+      continue;
+    }
+    const bool known = std::any_of(suggested_.begin(), suggested_.end(),
+                                   [&](const HalfSpace& other) { return other.cone == one.cone; });
+    if (!known) suggest(one.cone, cone.n - cone.mu / length * slipped);
+  }
+}
+
+/// Solves J x' = x by elimination; x' replaces x. An unknown that depends on those before it is zero, and
+/// equations that are left over hold or contradict the others. Eigen's decomposition would allocate.
+void ConeProjection::eliminate(Eigen::Index size) noexcept {
+  if (size == 0) return;
+  const double largest = J_.topLeftCorner(size, size).cwiseAbs().maxCoeff();
+  Eigen::Index rank = 0;
+  for (Eigen::Index k = 0; k < size; ++k) {
+    Eigen::Index pivot = rank;
+    for (Eigen::Index i = rank + 1; i < size; ++i)
+      if (std::abs(J_(i, k)) > std::abs(J_(pivot, k))) pivot = i;
+    pivots_[static_cast<std::size_t>(k)] =
+        rank < size && std::abs(J_(pivot, k)) > kLeastPivot * largest ? rank : -1;
+    if (pivots_[static_cast<std::size_t>(k)] < 0) continue;
+    for (Eigen::Index j = k; j < size && pivot != rank; ++j) std::swap(J_(rank, j), J_(pivot, j));
+    std::swap(x_[rank], x_[pivot]);
+    const Eigen::Index below = size - rank - 1;
+    auto factors = J_.col(k).segment(rank + 1, below);
+    factors /= J_(rank, k);
+    for (Eigen::Index j = k + 1; j < size; ++j)
+      if (J_(rank, j) != 0.0) J_.col(j).segment(rank + 1, below) -= J_(rank, j) * factors;
+    x_.segment(rank + 1, below) -= x_[rank] * factors;
+    ++rank;
+  }
+  for (Eigen::Index k = size; k-- > 0;) {
+    const Eigen::Index row = pivots_[static_cast<std::size_t>(k)];
+    d_x_[k] = row < 0 ? 0.0 : x_[row] / J_(row, k);
+    if (row > 0) x_.head(row) -= d_x_[k] * J_.col(k).head(row);
+  }
+  x_.head(size) = d_x_.head(size);
+}
+
+/// Makes violated half-spaces active until there is none.
+ConeProjection::Status ConeProjection::enter_violated(double tolerance_m) noexcept {
+  const std::size_t max_steps = steps_ + kMaxStepsPerUnknown * (dimension_ + cones_.size() + 1);
+  HalfSpace worst;
+  for (; steps_ < max_steps; ++steps_) {
+    if (!most_violated(tolerance_m, worst)) return Status::optimal;
+    if (!activate(worst)) return Status::infeasible;
+  }
+  return Status::budget_spent;
+}
+
 /// Makes the suggested half-spaces active, with their directions and the cones of this problem, and drops
-/// those with a negative multiplier, the most negative one first.
+/// those with a negative multiplier.
 void ConeProjection::start_with_suggested() noexcept {
+  active_.clear();
   for (const HalfSpace& old : suggested_) {
     if (old.cone >= cones_.size()) continue;
     const FrictionCone& cone = cones_[old.cone];
@@ -142,7 +404,12 @@ void ConeProjection::start_with_suggested() noexcept {
     const HalfSpace half_space = tangent(old.cone, direction);
     if (half_space.length > 0.0) append(half_space);
   }
-  while (!active_.empty()) {
+  drop_negative();
+}
+
+/// Recomputes z and the multipliers, and drops half-spaces with a negative one, the most negative first.
+void ConeProjection::drop_negative() noexcept {
+  for (;;) {
     recompute();
     std::size_t worst = active_.size();
     double most = 0.0;
@@ -164,9 +431,7 @@ void ConeProjection::recompute() noexcept {
   if (count == 0) return;
   for (Eigen::Index k = 0; k < count; ++k) {
     const HalfSpace& one = active_[static_cast<std::size_t>(k)];
-    double sum = one.bound - product(one, z0_);
-    for (Eigen::Index j = 0; j < k; ++j) sum -= R_(j, k) * r_[j];
-    r_[k] = sum / R_(k, k);
+    r_[k] = (one.bound - product(one, z0_) - dot_column(k, k, r_)) / R_(k, k);
   }
   const auto size = static_cast<Eigen::Index>(dimension_);
   for (Eigen::Index k = 0; k < count; ++k) z_.head(size) += r_[k] * Q_.col(k).head(size);
@@ -179,11 +444,9 @@ void ConeProjection::recompute() noexcept {
 bool ConeProjection::activate(HalfSpace entering) noexcept {
   const auto size = static_cast<Eigen::Index>(dimension_);
   for (;;) {
-    rest_.head(size).setZero();
-    scatter(entering, 1.0, rest_);
-    project_out(rest_, r_);
+    project_out(entering);
     back_substitute(r_, d_);
-    const double curvature = rest_.head(size).squaredNorm();
+    const double curvature = dot(rest_.data(), rest_.data(), size);
     const bool independent = curvature > kDependent && active_.size() < dimension_;
     const double violation = entering.bound - product(entering, z_);
     const double full = independent ? violation / curvature : std::numeric_limits<double>::infinity();
@@ -209,39 +472,54 @@ bool ConeProjection::activate(HalfSpace entering) noexcept {
   }
 }
 
-/// Subtracts from `rest` its projection on the active normals; r receives the coefficients on Q.
-/// Orthogonalises a second time if cancellation loses digits.
-void ConeProjection::project_out(Eigen::VectorXd& rest, Eigen::VectorXd& r) const noexcept {
+/// Subtracts from rest_, the scaled normal of a half-space, its projection on the active normals; r_ receives
+/// the coefficients on Q. Orthogonalises a second time if cancellation loses digits.
+void ConeProjection::project_out(const HalfSpace& half_space) noexcept {
   constexpr double kLittleLost = 0.5;  // fraction of the squared length, which is 1
   const auto size = static_cast<Eigen::Index>(dimension_);
   const auto count = static_cast<Eigen::Index>(active_.size());
-  r.head(count).setZero();
-  for (int pass = 0; pass < 2; ++pass) {
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const double c = Q_.col(k).head(size).dot(rest.head(size));
-      rest.head(size) -= c * Q_.col(k).head(size);
-      r[k] += c;
-    }
-    if (count == 0 || rest.head(size).squaredNorm() > kLittleLost) break;
+  const FrictionCone& cone = cones_[half_space.cone];
+  rest_.head(size).setZero();
+  push(cone, half_space.normal / half_space.length, rest_);
+  for (Eigen::Index k = 0; k < count; ++k) {  // only two blocks of the normal are not zero
+    const double* column = Q_.col(k).data();
+    double c = 0.0;
+    for (const std::size_t body : {cone.a, cone.b})
+      if (body != FrictionCone::kFixed) c += dot(column + at(body), rest_.data() + at(body), kBlock);
+    r_[k] = c;
+  }
+  for (Eigen::Index k = 0; k < count; ++k) rest_.head(size) -= r_[k] * Q_.col(k).head(size);
+  if (count == 0 || dot(rest_.data(), rest_.data(), size) > kLittleLost) return;
+  for (Eigen::Index k = 0; k < count; ++k) d_[k] = dot(Q_.col(k).data(), rest_.data(), size);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    rest_.head(size) -= d_[k] * Q_.col(k).head(size);
+    r_[k] += d_[k];
   }
 }
 
 void ConeProjection::back_substitute(const Eigen::VectorXd& r, Eigen::VectorXd& d) const noexcept {
   const auto count = static_cast<Eigen::Index>(active_.size());
-  for (Eigen::Index k = count; k-- > 0;) {
-    double sum = r[k];
-    for (Eigen::Index j = k + 1; j < count; ++j) sum -= R_(k, j) * d[j];
-    d[k] = sum / R_(k, k);
+  d.head(count) = r.head(count);
+  for (Eigen::Index k = count; k-- > 0;) {  // by columns, which are contiguous
+    d[k] /= R_(k, k);
+    d.head(k) -= d[k] * R_.col(k).head(k);
   }
+}
+
+/// Product of the first `rows` of a column of R and x.
+double ConeProjection::dot_column(Eigen::Index column, Eigen::Index rows,
+                                  const Eigen::VectorXd& x) const noexcept {
+  const Eigen::Index whole = rows - rows % 6;
+  double sum = dot(R_.col(column).data(), x.data(), whole);
+  for (Eigen::Index i = whole; i < rows; ++i) sum += R_(i, column) * x[i];
+  return sum;
 }
 
 /// Appends a half-space whose normal is orthogonalised here. Returns false if it depends on the active ones.
 bool ConeProjection::append(const HalfSpace& half_space) noexcept {
   if (active_.size() >= dimension_) return false;
-  rest_.head(static_cast<Eigen::Index>(dimension_)).setZero();
-  scatter(half_space, 1.0, rest_);
-  project_out(rest_, r_);
-  const double curvature = rest_.head(static_cast<Eigen::Index>(dimension_)).squaredNorm();
+  project_out(half_space);
+  const double curvature = dot(rest_.data(), rest_.data(), static_cast<Eigen::Index>(dimension_));
   if (!(curvature > kDependent)) return false;
   append(half_space, std::sqrt(curvature));
   return true;
@@ -257,11 +535,22 @@ void ConeProjection::append(const HalfSpace& half_space, double length) noexcept
   active_.push_back(half_space);
 }
 
-/// Removes the k-th active half-space and rebuilds the columns behind it.
-void ConeProjection::drop(std::size_t k) noexcept {
-  behind_.assign(active_.begin() + static_cast<std::ptrdiff_t>(k) + 1, active_.end());
-  active_.resize(k);
-  for (const HalfSpace& half_space : behind_) append(half_space);
+/// Removes the k-th active half-space. Rotations make R a triangle again.
+void ConeProjection::drop(std::size_t dropped) noexcept {
+  const auto size = static_cast<Eigen::Index>(dimension_);
+  const auto first = static_cast<Eigen::Index>(dropped);
+  active_.erase(active_.begin() + static_cast<std::ptrdiff_t>(dropped));
+  const auto count = static_cast<Eigen::Index>(active_.size());
+  for (Eigen::Index k = first; k < count; ++k) R_.col(k).head(k + 2) = R_.col(k + 1).head(k + 2);
+  for (Eigen::Index k = first; k < count; ++k) {
+    const double length = std::sqrt(R_(k, k) * R_(k, k) + R_(k + 1, k) * R_(k + 1, k));
+    const double c = R_(k, k) / length, s = R_(k + 1, k) / length;
+    R_(k, k) = length;
+    for (Eigen::Index j = k + 1; j < count; ++j) rotate(c, s, R_(k, j), R_(k + 1, j));
+    double* const a = Q_.col(k).data();
+    double* const b = Q_.col(k + 1).data();
+    for (Eigen::Index i = 0; i < size; ++i) rotate(c, s, a[i], b[i]);
+  }
 }
 
 StaticVector<Vector3d, 4> ConeProjection::active_normals(std::size_t cone) const noexcept {
@@ -269,13 +558,6 @@ StaticVector<Vector3d, 4> ConeProjection::active_normals(std::size_t cone) const
   for (const HalfSpace& one : active_)
     if (one.cone == cone) out.add(one.normal);
   return out;
-}
-
-Vector3d ConeProjection::force(std::size_t cone) const noexcept {
-  Vector3d sum = Vector3d::Zero();
-  for (const HalfSpace& one : active_)
-    if (one.cone == cone) sum += one.multiplier / one.length * one.normal;
-  return sum;
 }
 
 }  // namespace wrenchd

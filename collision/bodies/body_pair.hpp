@@ -45,6 +45,8 @@ class BodyPair {
   /// True if the features of a contact face each other at the end of the last sweep, to the clearance.
   /// RT-safe.
   bool touches(const Contact& contact) const noexcept;
+  /// The contacts with meshes whose gap at the end of the last sweep is at most its clearance. RT-safe.
+  const ContactSet& touching() const noexcept { return contacts_.touching(); }
   /// Prepares the sweeps of the next tick. X_next: expected end poses. RT-safe.
   void prefetch(const BodyPath& path_a, const BodyPath& path_b, double time_s, VisitBudget& budget) noexcept;
   /// Forgets what was prepared, after a body was placed elsewhere. RT-safe.

@@ -15,15 +15,24 @@ namespace {
 
 /// Newton steps of an island: at most this number with the slip of the last iterate, METHOD (106), then at
 /// most this number with the relaxed cone.
-constexpr int kNewtonSteps = 16;
+constexpr int kNewtonSteps = 12;
+/// Newton steps of an island after the work limit of the solver.
+constexpr int kLateSteps = 2;
+/// Newton steps without an answer to Coulomb's law, after which the lifts of the cones stay as they are.
+constexpr int kUnanswered = 2;
 /// A solve ends if no point moved farther than this in a Newton step [m]. It is small against the clearance.
 constexpr double kConverged_m = 1e-10;
 /// Accepted violation of a cone in a Newton step [m].
-constexpr double kTolerance_m = 1e-13;
+constexpr double kTolerance_m = 1e-11;
 /// Least gap of an admissible pose and of a contact that is held at less than the clearance, and the largest
 /// gap of a contact that touches, as multiples of the clearance.
 constexpr double kMinClearance = 0.2;
 constexpr double kTouch = 1.1;
+/// What the gap of a contact below the clearance may open in a step, as a multiple of the clearance.
+constexpr double kOpening = 0.01;
+/// Contacts with a gap below this multiple of the clearance at the start are added where a sweep finds too
+/// few.
+constexpr double kNear = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
@@ -132,6 +141,7 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
   contacts_before_ = contacts_;  // equal capacities: no allocation
   time_before_s_ = time_s_;
   budget_ = {settings_.node_visits};
+  solver_steps_ = 0;
   last_change_m_ = 0.0;
   for (Body& body : bodies_) {
     body.touches = false;
@@ -151,8 +161,18 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
     bodies_[contact.a].touches = true;
     if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
   }
+  for (BodyContact& contact : contacts_) contact.hold_m = held_gap_m(contact, kOpening * kClearance_m);
   move_contacts(time_s_, until_s_);
   for (Body& body : bodies_) set_goal(body);
+}
+
+/// A contact is held at the clearance, or at the gap that it has at the start, which may open by opening_m:
+/// pushing bodies apart takes energy. An obstacle that moves pushes.
+double BodyWorld::held_gap_m(const BodyContact& c, double opening_m) const noexcept {
+  if (c.b == BodyContact::kFixed && pair_of(c).scene().has_moving_obstacles()) return kClearance_m;
+  const Pose X_WB = c.b == BodyContact::kFixed ? Pose{} : bodies_[c.b].motion.X_WB;
+  const double gap_m = geometry_of(c, bodies_[c.a].motion.X_WB, X_WB).gap_m;
+  return std::clamp(gap_m + opening_m, kMinClearance * kClearance_m, kClearance_m);
 }
 
 /// A body without contact ends where its exact motion ends. One with contact moves at the velocity that it
@@ -167,6 +187,7 @@ void BodyWorld::set_goal(Body& body) noexcept {
     body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_WP_, body.fraction) : X_WP_;
   } else {
     body.step_s = body.fraction * dt_s_;
+    if (body.step_s == 0.0) return hold(body);
     body.weight_per_s2 = 1.0 / (body.step_s * body.step_s);
     body.free = moved_freely(body.M, body.motion, body.forces, body.step_s);
     body.X_goal = body.free.X_WB;
@@ -178,6 +199,15 @@ void BodyWorld::set_goal(Body& body) noexcept {
     }
   }
   if (!body.touches) body.X_WQ = body.X_goal;
+}
+
+/// A body that is held stays where it is, at rest.
+void BodyWorld::hold(Body& body) noexcept {
+  body.step_s = 0.0;
+  body.X_WQ = body.X_goal = body.motion.X_WB;
+  body.free = body.motion;
+  body.free.velocity_W_m_per_s.setZero();
+  body.free.spin_W.setZero();
 }
 
 void BodyWorld::move_contacts(double from_s, double to_s) noexcept {
@@ -237,17 +267,25 @@ void BodyWorld::solve_island(std::size_t island) noexcept {
   }
   for (std::size_t k = 0; k < contacts_.size(); ++k)
     if (bodies_[contacts_[k].a].island == island) island_contacts_.push_back(k);
+  if (bodies_[island].fraction == 0.0) {
+    for (const std::size_t k : island_contacts_) contacts_[k].force_W_N.setZero();
+    for (const std::size_t i : island_bodies_) hold(bodies_[i]);
+    return;
+  }
   if (island_contacts_.empty()) {
     for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].X_goal;
     return;
   }
-  for (const Slip slip : {Slip::last_iterate, Slip::none}) {
-    for (int k = 0; k < kNewtonSteps; ++k) {
-      const bool first = k == 0 && slip == Slip::last_iterate;
-      if (newton_step(first ? Slip::last_step : slip) && k > 0) break;
-    }
-    if (admissible(island)) return;
+  int unanswered = 0;
+  for (int k = 0; k < kNewtonSteps; ++k) {
+    const bool in_time = solver_steps_ < settings_.solver_steps;
+    if (newton_step(in_time && unanswered < kUnanswered ? Friction::coulomb : Friction::frozen)) break;
+    if (cones_status_ == ConeProjection::Status::budget_spent) ++unanswered;
+    if (!in_time && k >= kLateSteps) break;
   }
+  if (admissible(island)) return;
+  for (int k = 0; k < kNewtonSteps; ++k)
+    if (newton_step(Friction::relaxed)) break;
 }
 
 ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
@@ -293,17 +331,16 @@ Vector3d BodyWorld::slip_m(const BodyContact& c, const ContactGeometry& at) cons
   return moved - at.n_W.dot(moved) * at.n_W;
 }
 
-/// METHOD (105). slip: where the length of the slip in (106) comes from; none keeps every gap open.
-FrictionCone BodyWorld::cone_of(const BodyContact& c, Slip slip) const noexcept {
+/// METHOD (105).
+FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const noexcept {
   const ContactGeometry at = acting_geometry(c);
   FrictionCone cone;
   cone.n = at.n_W;
   cone.mu = c.mu;
-  cone.h_m = geometry(c).gap_m - kClearance_m;
+  cone.h_m = geometry(c).gap_m - c.hold_m;
   if (c.mu > 0.0) {
     cone.slip_m = slip_m(c, at);
-    if (slip == Slip::last_step) cone.h_m += c.mu * c.slip_m;
-    if (slip == Slip::last_iterate) cone.h_m += c.mu * cone.slip_m.norm();
+    if (friction != Friction::relaxed) cone.s_m = c.mu * c.slip_m;
   }
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
     const Body& body = bodies_[i];
@@ -322,7 +359,7 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Slip slip) const noexcept 
 }
 
 /// One Newton step of an island, METHOD (99), (105). Returns true if it moved no point.
-bool BodyWorld::newton_step(Slip slip) noexcept {
+bool BodyWorld::newton_step(Friction friction) noexcept {
   cones_.clear(island_bodies_.size());
   for (const std::size_t i : island_bodies_) {
     Body& body = bodies_[i];
@@ -342,9 +379,11 @@ bool BodyWorld::newton_step(Slip slip) noexcept {
   for (const std::size_t k : island_contacts_) {
     const BodyContact& contact = contacts_[k];
     for (const Vector3d& normal : contact.active_normals) cones_.suggest(cones_.cone_count(), normal);
-    cones_.add(cone_of(contact, slip));
+    cones_.add(cone_of(contact, friction));
   }
-  cones_.solve(kTolerance_m);
+  cones_status_ =
+      friction == Friction::coulomb ? cones_.solve_coulomb(kTolerance_m) : cones_.solve(kTolerance_m);
+  solver_steps_ += static_cast<std::uint32_t>(cones_.steps());
   double change_m = 0.0;
   for (const std::size_t i : island_bodies_) {
     Body& body = bodies_[i];
@@ -353,12 +392,13 @@ bool BodyWorld::newton_step(Slip slip) noexcept {
     const Vector3d turn = body.root.triangularView<Eigen::Upper>().solve(z.tail<3>());
     body.X_WQ.translation_m += shift;
     body.X_WQ.rotation = (body.X_WQ.rotation * rotation_from(turn)).normalized();
-    change_m = std::max(change_m, shift.norm() + body.radius_m * turn.norm());
+    change_m = std::max(shift.norm() + body.radius_m * turn.norm(), change_m);
   }
   for (std::size_t k = 0; k < island_contacts_.size(); ++k) {
     BodyContact& contact = contacts_[island_contacts_[k]];
     contact.force_W_N = cones_.force(k);
     contact.active_normals = cones_.active_normals(k);
+    if (contact.mu > 0.0 && friction == Friction::coulomb) contact.slip_m = cones_.lift_m(k) / contact.mu;
   }
   last_change_m_ = change_m;
   return change_m <= kConverged_m;
@@ -409,8 +449,21 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
   for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return false;
   if (found.complete && !found.overlaps && held_open(pair, found)) return free;
-  shorten(pair);
+  if (!add_touching(pair)) shorten(pair);
   return false;
+}
+
+/// Adds the contacts that touch at the start. A sweep that finds no contact although its end overlaps may
+/// lack one that was dropped at the border of its features. Returns false if all are known.
+bool BodyWorld::add_touching(BodyPair& pair) noexcept {
+  if (pair.scene().has_moving_obstacles()) return false;  // their contacts are those of the end of the step
+  const auto start_of = [&](std::size_t i) {
+    return i == BodyContact::kFixed ? BodyPath{} : BodyPath{bodies_[i].motion.X_WB, bodies_[i].motion.X_WB};
+  };
+  pair.sweep(start_of(pair.a()), start_of(pair.b()), kNear * kClearance_m, budget_, {time_s_, time_s_});
+  bool found_new = false;
+  for (const Contact& contact : pair.touching()) found_new = add_contact(pair, contact) || found_new;
+  return found_new;
 }
 
 /// True if the known contacts keep open what a sweep found: a gap just below the clearance is no crossing.
@@ -481,8 +534,7 @@ void BodyWorld::shorten(const BodyPair& pair) noexcept {
   }
 }
 
-/// Returns false if the contact is known or there is no room. A contact with less room than the clearance at
-/// the start is held at that gap, so that the start remains admissible.
+/// Returns false if the contact is known or there is no room.
 bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexcept {
   if (contacts_.size() == kMaxContacts) return false;
   BodyContact added;
@@ -493,15 +545,7 @@ bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexce
     if (known.a == added.a && known.b == added.b && same_features(known.contact, contact)) return false;
   const Body& a = bodies_[added.a];
   added.mu = pair.is_fixed() ? a.friction : std::sqrt(a.friction * bodies_[added.b].friction);
-  const bool moves = pair.is_fixed() && pair.scene().has_moving_obstacles();
-  const double gap =
-      geometry_of(added, a.motion.X_WB, pair.is_fixed() ? Pose{} : bodies_[added.b].motion.X_WB).gap_m;
-  if (!moves && gap < kClearance_m) {
-    const double gap_reduction_m = kClearance_m - std::max(gap, kMinClearance * kClearance_m);
-    const Pose X_BA = pair.is_fixed() ? a.motion.X_WB : inverse(bodies_[added.b].motion.X_WB) * a.motion.X_WB;
-    added.contact.p_WCb_m -= gap_reduction_m * normal_W(contact, X_BA);
-    added.contact.offset_m -= gap_reduction_m;
-  }
+  added.hold_m = held_gap_m(added, 0.0);
   added.stays = std::any_of(dropped_.begin(), dropped_.end(), [&](const BodyContact& dropped) {
     return dropped.a == added.a && dropped.b == added.b && same_features(dropped.contact, contact);
   });
@@ -522,9 +566,11 @@ const BodyPair& BodyWorld::pair_of(const BodyContact& contact) const noexcept {
 bool BodyWorld::drop_separated() noexcept {
   bool carried = false;
   std::erase_if(contacts_, [&](const BodyContact& c) {
-    const bool open = geometry(c).gap_m > kTouch * kClearance_m;
+    if (bodies_[c.a].asleep || c.stays) return false;
+    const double gap_m = geometry(c).gap_m;
     const bool loaded = c.force_W_N.squaredNorm() > 0.0;
-    if (bodies_[c.a].asleep || c.stays || (open ? loaded : pair_of(c).touches(c.contact))) return false;
+    if (gap_m > kTouch * kClearance_m) return !loaded;
+    if (pair_of(c).touches(c.contact)) return false;
     if (!loaded) return true;
     carried = true;
     if (dropped_.size() < dropped_.capacity()) dropped_.push_back(c);
@@ -565,12 +611,7 @@ bool BodyWorld::admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, d
 
 /// Nothing moves, bodies and obstacles: the poses at the start are admissible together.
 void BodyWorld::hold_all() noexcept {
-  for (Body& body : bodies_) {
-    body.X_WQ = body.X_goal = body.motion.X_WB;
-    body.free = body.motion;
-    body.free.velocity_W_m_per_s.setZero();
-    body.free.spin_W.setZero();
-  }
+  for (Body& body : bodies_) hold(body);
   move_contacts(until_s_, time_s_);
   for (BodyContact& contact : contacts_) {
     contact.force_W_N.setZero();

@@ -42,6 +42,9 @@ class BodyWorld {
     bool sleeps = true;                   ///< bodies at rest cost nothing until something touches them
     std::uint32_t rounds = 24;            ///< rounds of solving and sweeping per step
     std::uint32_t node_visits = 400'000;  ///< work limit of all sweeps of a step [node visits]
+    /// Steps of ConeProjection after which a step looks for no more answers to Coulomb's law and takes
+    /// convex ones.
+    std::uint32_t solver_steps = 300;
   };
   /// What the hand asks for: the pose that it commands and the stiffness k of the energy law.
   struct Hand {
@@ -84,7 +87,7 @@ class BodyWorld {
   std::span<const BodyContact> contacts() const noexcept { return contacts_; }
   /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
   double time_s() const noexcept { return time_s_; }
-  /// Largest displacement of a point by the last Newton step [m]; 1e-10 or less if it converged.
+  /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
   double last_change_m() const noexcept { return last_change_m_; }
   /// Work of bodies and moving obstacles on the tool in the last step [J]: METHOD (111).
   double work_on_tool_J() const noexcept { return work_on_tool_J_; }
@@ -120,18 +123,19 @@ class BodyWorld {
     Matrix3d root = Matrix3d::Identity();  ///< root of the rotational part of the metric
   };
 
-  enum class Slip : std::uint8_t { none, last_step, last_iterate };
+  enum class Friction : std::uint8_t { coulomb, frozen, relaxed };
 
   void begin(const std::optional<Hand>& hand) noexcept;
   void set_goal(Body& body) noexcept;
+  double held_gap_m(const BodyContact& contact, double opening_m) const noexcept;
   void move_contacts(double from_s, double to_s) noexcept;
   void find_islands() noexcept;
   std::size_t root_of(std::size_t body) noexcept;
   void solve_islands() noexcept;
   void solve_island(std::size_t island) noexcept;
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
-  bool newton_step(Slip slip) noexcept;
-  FrictionCone cone_of(const BodyContact& contact, Slip slip) const noexcept;
+  bool newton_step(Friction friction) noexcept;
+  FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
   Vector3d displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept;
   Vector3d other_displacement_m(const BodyContact& contact, const Vector3d& point_W_m) const noexcept;
   Vector3d slip_m(const BodyContact& contact, const ContactGeometry& at) const noexcept;
@@ -142,6 +146,7 @@ class BodyWorld {
   bool takes_part(std::size_t body) const noexcept;
   bool sweep_pairs() noexcept;
   bool sweep_pair(BodyPair& pair) noexcept;
+  bool add_touching(BodyPair& pair) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
   bool drop_separated() noexcept;
   bool held_open(const BodyPair& pair, const SweepQuery::SweepResult& found) const noexcept;
@@ -149,6 +154,7 @@ class BodyWorld {
   void wake(std::size_t body) noexcept;
   void fall_asleep() noexcept;
   void shorten(const BodyPair& pair) noexcept;
+  void hold(Body& body) noexcept;
   void hold_all() noexcept;
   void apply_impulses() noexcept;
   void prefetch() noexcept;
@@ -170,6 +176,7 @@ class BodyWorld {
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;
+  ConeProjection::Status cones_status_ = ConeProjection::Status::optimal;
   Pose X_WP_;  ///< of the hand
   VisitBudget budget_;
   double time_s_ = 0.0;   ///< scene time of the obstacle poses
@@ -177,7 +184,7 @@ class BodyWorld {
   double until_s_ = 0.0;  ///< scene time of the obstacle poses at the end of the step
   double work_on_tool_J_ = 0.0;
   double last_change_m_ = 0.0;
-  std::uint32_t rounds_ = 0;
+  std::uint32_t rounds_ = 0, solver_steps_ = 0;
 };
 
 }  // namespace wrenchd

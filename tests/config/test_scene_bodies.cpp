@@ -116,10 +116,10 @@ TEST_CASE("a free body with an error is rejected with its place and the remedy",
   says(tool + body + "mass = 1.0\ndensity_kg_per_m3 = 700.0\n", "keep one of 'mass' and 'density_kg_per_m3'");
   says(tool + body + "inertia = \"hull\"\ndensity_kg_per_m3 = 700.0\n", "needs the volume of a solid");
   says(tool + body + "friction = -0.1\n", "friction");
-  says(tool + body + "velocity_m_per_s = [9.0, 0.0, 0.0]\n", "no more than 5");
+  says(tool + body + "velocity_m_per_s = [9.0, 0.0, 0.0]\n", "a number from -5 to 5 m/s, found 9");
   says(tool + "[[body]]\nmass = 1.0\n", "mesh");
   says(tool + "[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n",
-       "there is an obstacle or a body 'b' already");
+       "there is a body 'b' already; give this one another name");
   says("gravity_m_per_s2 = [0.0, 0.0, -9.81]\n" + tool, "the scene has none; add a [[body]]");
   std::string nine = tool;
   for (int i = 0; i < 9; ++i) nine += body;

@@ -90,6 +90,57 @@ TEST_CASE("the answer is the nearest step in all cones", "[cone_projection]") {
   }
 }
 
+/// Coulomb's law: no gap is negative, what is loaded has none, and friction is within its cone, opposite to
+/// the slip.
+void check_coulomb(const ConeProjection& problem, const Cones& cones, const std::vector<Vector6d>& z0) {
+  std::vector<Vector6d> pull(z0.size());
+  for (std::size_t i = 0; i < z0.size(); ++i) pull[i] = problem.z(i) - z0[i];
+  for (std::size_t k = 0; k < cones.size(); ++k) {
+    const FrictionCone& cone = cones[k];
+    const Vector3d force = problem.force(k);
+    const double load = cone.n.dot(force);
+    Vector3d moved = cone.D_a * problem.z(cone.a);
+    pull[cone.a] -= cone.D_a.transpose() * force;
+    if (cone.b != FrictionCone::kFixed) {
+      moved += cone.D_b * problem.z(cone.b);
+      pull[cone.b] -= cone.D_b.transpose() * force;
+    }
+    const Vector3d slip = moved - cone.n.dot(moved) * cone.n + cone.slip_m;
+    const double gap_m = cone.n.dot(moved) + cone.h_m;
+    INFO("cone " << k << ", gap " << gap_m << ", load " << load << ", slip " << slip.norm());
+    CHECK(gap_m >= -1e-9);
+    CHECK(load >= -1e-9);
+    CHECK(std::abs(gap_m) * load < 1e-8);
+    const Vector3d friction = force - load * cone.n;
+    CHECK(friction.norm() <= cone.mu * load + 1e-8);
+    CHECK(std::abs(friction.dot(slip) + cone.mu * load * slip.norm()) < 1e-7);
+    CHECK(problem.lift_m(k) == Approx(cone.mu * slip.norm()).margin(1e-12));
+  }
+  for (const Vector6d& rest : pull) CHECK(rest.norm() < 1e-8);
+}
+
+TEST_CASE(
+    "with the lifts of Coulomb's law the gaps of loaded cones are closed, and friction opposes the slip",
+    "[cone_projection]") {
+  RandomProblem made{test::RandomValues(8)};
+  int answered = 0;
+  constexpr int kProblems = 200;
+  for (int k = 0; k < kProblems; ++k) {
+    const std::size_t bodies = 1 + made.random.bits() % 5;
+    const Cones cones = made.cones(bodies, 1 + made.random.bits() % (4 * bodies), 0.1 * (1 + k % 5));
+    ConeProjection problem(bodies, cones.size());
+    problem.clear(bodies);
+    std::vector<Vector6d> z0(bodies);
+    for (std::size_t i = 0; i < bodies; ++i) problem.z0(i) = z0[i] = made.random.vector<6>();
+    for (const FrictionCone& cone : cones) REQUIRE(problem.add(cone));
+    INFO("problem " << k);
+    if (problem.solve_coulomb(1e-11) != ConeProjection::Status::optimal) continue;
+    ++answered;
+    check_coulomb(problem, cones, z0);
+  }
+  CHECK(answered > 0.9 * kProblems);
+}
+
 TEST_CASE("without friction the answer is that of LeastDistance", "[cone_projection]") {
   RandomProblem made{test::RandomValues(6)};
   for (int k = 0; k < 50; ++k) {
@@ -136,6 +187,7 @@ TEST_CASE("a solve of cones does not allocate", "[cone_projection]") {
   for (std::size_t i = 0; i < cones.size(); ++i)
     for (const Vector3d& normal : problem.active_normals(i)) problem.suggest(i, normal);
   problem.solve(1e-11);
+  problem.solve_coulomb(1e-11);
   CHECK(guard.allocations() == 0);
 }
 

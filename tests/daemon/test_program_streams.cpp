@@ -159,7 +159,7 @@ TEST_CASE("a recording that reaches the limit of the file size ends, the run goe
           "[streams]") {
   const TemporaryDirectory files;
   const std::string here = files.path().string();
-  CHECK(shell("cd " + here + " && ulimit -f 10000 && exec " + kProgram +
+  CHECK(shell("cd " + here + " && ulimit -f 20000 && exec " + kProgram +
               " --virtual-time --seconds 120 --arm --record run.h5 2> log") == 0);
   const std::string log = contents(files.path() / "log");
   CHECK_THAT(log, Contains("the recording has ended after ") && Contains(kReleased));

@@ -51,18 +51,20 @@ TEST_CASE("the tool pushes a crate, and its answer is that of a proxy", "[body_p
   double t_s = 0.0;
   for (int k = 0; k < 300; ++k) proxy.move_without_tool(t_s += kTick_s);
   REQUIRE(proxy.enter(at(-0.06), proxy.poses(), proxy.time_s()));
-  double work_J = 0.0;
+  // On the spring of the hand the crate swings about its steady motion, so the test takes the mean force.
+  constexpr int kTicks = 1500, kSettled = 700;
+  double work_J = 0.0, force_N = 0.0;
   Penetration last;
   const double start_m = proxy.poses()[0].translation_m.x();
-  for (int k = 0; k < 1000; ++k) {
+  for (int k = 0; k < kTicks; ++k) {
     last = proxy.follow(at(-0.06 + 0.1 * kTick_s * k), kStiffness_per_s2, t_s += kTick_s);
     work_J += 0.5 * kStiffness_per_s2 * proxy.work_kg_m2();
     CHECK(last.projection.status != ProjectionStatus::infeasible);
+    if (k >= kSettled) force_N += kStiffness_per_s2 * 0.2 * -last.eps.x() / (kTicks - kSettled);
   }
   CHECK(last.projection.status == ProjectionStatus::converged);
   CHECK(last.projection.kkt_residual < 1e-6);
   // The hand is ahead of the proxy by the stretch of the spring that overcomes the friction.
-  const double force_N = kStiffness_per_s2 * 0.2 * -last.eps.x();
   CHECK(force_N == Approx(kFriction * kMass_kg * 9.81).epsilon(0.1));
   const double moved_m = proxy.poses()[0].translation_m.x() - start_m;
   CHECK(moved_m > 0.05);
