@@ -173,14 +173,12 @@ ConeProjection::Status ConeProjection::solve_coulomb(double tolerance_m) noexcep
     if (status == Status::infeasible) return status;
     const bool fits = lifts_fit(tolerance_m);
     if (fits && !slides()) return status;
-    z_before_.head(static_cast<Eigen::Index>(dimension_)) = z_.head(static_cast<Eigen::Index>(dimension_));
+    const auto size = static_cast<Eigen::Index>(dimension_);
+    z_before_.head(size) = z_.head(size);
     if (solve_active() && obeys_coulomb(tolerance_m)) return Status::optimal;
-    if (fits) {
-      z_.head(static_cast<Eigen::Index>(dimension_)) = z_before_.head(static_cast<Eigen::Index>(dimension_));
-      take_forces();
-      return status;
-    }
-    z_.head(static_cast<Eigen::Index>(dimension_)) = z_before_.head(static_cast<Eigen::Index>(dimension_));
+    z_.head(size) = z_before_.head(size);
+    take_forces();
+    if (fits) return status;
     suggest_active();
     for (std::size_t i = 0; i < cones_.size(); ++i) cones_[i].s_m = lift_m(i);
   }
@@ -246,8 +244,8 @@ bool ConeProjection::obeys_coulomb(double tolerance_m) const noexcept {
 }
 
 /// A Newton step for Coulomb's law among the active cones, METHOD (112): an unknown for the load and one for
-/// the direction of friction of each cone that slides, and one for each active half-space of the others,
-/// which stick. Changes z and the forces. Returns the largest angle by which a direction turned [rad].
+/// the direction of friction of each cone that slides, and three for the force of one that sticks. Changes z
+/// and the forces. Returns the largest angle by which a direction turned [rad].
 double ConeProjection::newton_step() noexcept {
   ++steps_;
   set_unknowns();

@@ -61,7 +61,7 @@ class ConeProjection {
   /// Solves with the lifts that the cones have. tolerance_m: accepted violation of a cone [m].
   Status solve(double tolerance_m) noexcept;
   /// Solves with the lifts of Coulomb's law, METHOD (106); those that the cones have are the first guess.
-  /// Without an answer after some steps, the lifts are those of the last one: lift_error_m() tells.
+  /// Status budget_spent: no answer after some steps, z is that for the lifts of the last one.
   Status solve_coulomb(double tolerance_m) noexcept;
 
   /// The answer for a body.

@@ -17,17 +17,21 @@ namespace {
 /// most this number with the relaxed cone.
 constexpr int kNewtonSteps = 12;
 /// Newton steps of an island after the work limit of the solver.
-constexpr int kLateSteps = 2;
+constexpr int kLateSteps = 8;
 /// Newton steps without an answer to Coulomb's law, after which the lifts of the cones stay as they are.
 constexpr int kUnanswered = 2;
 /// A solve ends if no point moved farther than this in a Newton step [m]. It is small against the clearance.
 constexpr double kConverged_m = 1e-10;
+/// A solve that did not end is accepted if no point moved farther in its last step [m].
+constexpr double kAccepted_m = 1e-9;
 /// Accepted violation of a cone in a Newton step [m].
 constexpr double kTolerance_m = 1e-11;
 /// Least gap of an admissible pose and of a contact that is held at less than the clearance, and the largest
 /// gap of a contact that touches, as multiples of the clearance.
 constexpr double kMinClearance = 0.2;
 constexpr double kTouch = 1.1;
+/// Gap at which a sweep looks past the contacts that are held open, as a multiple of the clearance.
+constexpr double kBehind = 0.1;
 /// What the gap of a contact below the clearance may open in a step, as a multiple of the clearance.
 constexpr double kOpening = 0.01;
 /// Contacts with a gap below this multiple of the clearance at the start are added where a sweep finds too
@@ -40,6 +44,10 @@ constexpr double kMinFraction = 1.0 / 256.0;
 /// What begins to slide or to topple is faster within a few steps.
 constexpr double kCalmSpeed_m_per_s = 1e-5;
 constexpr std::uint16_t kCalmSteps = 100;
+
+double shorter(double fraction) noexcept {
+  return fraction > kMinFraction ? kShorter * fraction : 0.0;
+}
 
 /// The pose at a fraction of the straight path between two poses.
 Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
@@ -247,16 +255,20 @@ void BodyWorld::solve_islands() noexcept {
       fraction = std::min(fraction, body.fraction);
     }
     if (solved) continue;
-    for (Body& body : bodies_) {
-      if (body.island != island || body.weight_per_s2 == 0.0) continue;
-      body.fraction = fraction;
-      set_goal(body);
+    for (;;) {
+      for (Body& body : bodies_) {
+        if (body.island != island || body.weight_per_s2 == 0.0) continue;
+        body.fraction = fraction;
+        set_goal(body);
+      }
+      if (solve_island(island)) break;
+      fraction = shorter(fraction);
     }
-    solve_island(island);
   }
 }
 
-void BodyWorld::solve_island(std::size_t island) noexcept {
+/// Solves an island. Returns false if Newton's method does not converge: the tick is then too long.
+bool BodyWorld::solve_island(std::size_t island) noexcept {
   island_bodies_.clear();
   island_contacts_.clear();
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -270,11 +282,11 @@ void BodyWorld::solve_island(std::size_t island) noexcept {
   if (bodies_[island].fraction == 0.0) {
     for (const std::size_t k : island_contacts_) contacts_[k].force_W_N.setZero();
     for (const std::size_t i : island_bodies_) hold(bodies_[i]);
-    return;
+    return true;
   }
   if (island_contacts_.empty()) {
     for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].X_goal;
-    return;
+    return true;
   }
   int unanswered = 0;
   for (int k = 0; k < kNewtonSteps; ++k) {
@@ -283,9 +295,12 @@ void BodyWorld::solve_island(std::size_t island) noexcept {
     if (cones_status_ == ConeProjection::Status::budget_spent) ++unanswered;
     if (!in_time && k >= kLateSteps) break;
   }
-  if (admissible(island)) return;
+  if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
   for (int k = 0; k < kNewtonSteps; ++k)
-    if (newton_step(Friction::relaxed)) break;
+    if (newton_step(Friction::none)) break;
+  if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
+  for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].motion.X_WB;
+  return false;
 }
 
 ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
@@ -331,16 +346,16 @@ Vector3d BodyWorld::slip_m(const BodyContact& c, const ContactGeometry& at) cons
   return moved - at.n_W.dot(moved) * at.n_W;
 }
 
-/// METHOD (105).
+/// METHOD (105). Without friction: (107).
 FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const noexcept {
   const ContactGeometry at = acting_geometry(c);
   FrictionCone cone;
   cone.n = at.n_W;
-  cone.mu = c.mu;
   cone.h_m = geometry(c).gap_m - c.hold_m;
-  if (c.mu > 0.0) {
+  if (c.mu > 0.0 && friction != Friction::none) {
+    cone.mu = c.mu;
     cone.slip_m = slip_m(c, at);
-    if (friction != Friction::relaxed) cone.s_m = c.mu * c.slip_m;
+    cone.s_m = c.mu * c.slip_m;
   }
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
     const Body& body = bodies_[i];
@@ -448,9 +463,29 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
   bool found_new = false;
   for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return false;
-  if (found.complete && !found.overlaps && held_open(pair, found)) return free;
+  if (found.complete && !found.overlaps) {
+    if (found.contacts.empty()) return free;
+    if (held_open(pair, found)) return !add_behind(pair) && free;
+  }
   if (!add_touching(pair)) shorten(pair);
   return false;
+}
+
+/// Adds contacts that a sweep did not name because the path meets known ones first. These are held open, but
+/// at less than the clearance. Returns true if there are such contacts.
+bool BodyWorld::add_behind(BodyPair& pair) noexcept {
+  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
+  const BodyPair::SweepTimes times = {time_s_, until_s_};
+  const SweepQuery::SweepResult behind = pair.sweep(path_a, path_b, kBehind * kClearance_m, budget_, times);
+  bool found_new = false;
+  for (const Contact& contact : behind.contacts) found_new = add_contact(pair, contact) || found_new;
+  if (found_new) return true;
+  if (behind.complete && !behind.overlaps && behind.contacts.empty()) {
+    pair.sweep(path_a, path_b, kClearance_m, budget_, times);  // for touches()
+    return false;
+  }
+  shorten(pair);
+  return true;
 }
 
 /// Adds the contacts that touch at the start. A sweep that finds no contact although its end overlaps may
@@ -528,7 +563,7 @@ void BodyWorld::shorten(const BodyPair& pair) noexcept {
     const std::size_t island = bodies_[i].island;
     for (Body& body : bodies_) {
       if (body.island != island) continue;
-      body.fraction = body.fraction > kMinFraction ? kShorter * body.fraction : 0.0;
+      body.fraction = shorter(body.fraction);
       body.solved = false;
     }
   }

@@ -123,7 +123,7 @@ class BodyWorld {
     Matrix3d root = Matrix3d::Identity();  ///< root of the rotational part of the metric
   };
 
-  enum class Friction : std::uint8_t { coulomb, frozen, relaxed };
+  enum class Friction : std::uint8_t { coulomb, frozen, none };
 
   void begin(const std::optional<Hand>& hand) noexcept;
   void set_goal(Body& body) noexcept;
@@ -132,7 +132,7 @@ class BodyWorld {
   void find_islands() noexcept;
   std::size_t root_of(std::size_t body) noexcept;
   void solve_islands() noexcept;
-  void solve_island(std::size_t island) noexcept;
+  bool solve_island(std::size_t island) noexcept;
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
   bool newton_step(Friction friction) noexcept;
   FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
@@ -146,6 +146,7 @@ class BodyWorld {
   bool takes_part(std::size_t body) const noexcept;
   bool sweep_pairs() noexcept;
   bool sweep_pair(BodyPair& pair) noexcept;
+  bool add_behind(BodyPair& pair) noexcept;
   bool add_touching(BodyPair& pair) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
   bool drop_separated() noexcept;

@@ -20,8 +20,11 @@ from .errors import WrenchdError
 FORMAT = "9"  # recording format that this module reads, as daemon/recording/recording_file.cpp writes it
 
 # Names of the components of an array field, by its unit. Other arrays are numbered.
+_POSE = (("px", "m"), ("py", "m"), ("pz", "m"), ("qx", "1"), ("qy", "1"), ("qz", "1"), ("qw", "1"))
+_BODIES = 8  # free bodies that a scene may have
 _COMPONENTS = {
-    "m m m, qx qy qz qw": (("px", "m"), ("py", "m"), ("pz", "m"), ("qx", "1"), ("qy", "1"), ("qz", "1"), ("qw", "1")),
+    "m m m, qx qy qz qw": _POSE,
+    "m m m, qx qy qz qw, of each body": tuple((f"body{body}.{name}", unit) for body in range(_BODIES) for name, unit in _POSE),
     "N x3, N.m x3": (("fx", "N"), ("fy", "N"), ("fz", "N"), ("tx", "N.m"), ("ty", "N.m"), ("tz", "N.m")),
     "m/s x3, rad/s x3": (("vx", "m/s"), ("vy", "m/s"), ("vz", "m/s"), ("wx", "rad/s"), ("wy", "rad/s"), ("wz", "rad/s")),
     "m x3, rad x3": (("x", "m"), ("y", "m"), ("z", "m"), ("rx", "rad"), ("ry", "rad"), ("rz", "rad")),
@@ -316,13 +319,17 @@ def _interpolated(time_s, values, at, before, components):
     span = time_s[after] - time_s[before]
     weight = np.divide(at - time_s[before], span, out=np.zeros_like(at), where=span > 0.0)[:, None]
     low, high = values[before], values[after].copy()
-    quaternion = [components.index(name) for name in _QUATERNION] if set(_QUATERNION) <= set(components) else []
-    if quaternion:
+    quaternions = {}
+    for i, name in enumerate(components):
+        body, _, last = name.rpartition(".")
+        if last in _QUATERNION:
+            quaternions.setdefault(body, []).append(i)
+    for quaternion in quaternions.values():
         flipped = np.sum(low[:, quaternion] * high[:, quaternion], axis=1) < 0.0
         high[np.ix_(flipped, quaternion)] *= -1.0
     with np.errstate(invalid="ignore"):
         result = np.where(weight == 0.0, low, (1.0 - weight) * low + weight * high)
-        if quaternion:
+        for quaternion in quaternions.values():
             norm = np.linalg.norm(result[:, quaternion], axis=1)
             between = (weight[:, 0] != 0.0) & (norm > 0.0)
             result[np.ix_(between, quaternion)] /= norm[between][:, None]
