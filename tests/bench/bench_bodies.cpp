@@ -199,14 +199,14 @@ double energy_J(const BoxScene& scene, const Simulator& simulator) {
 
 struct Figures {
   std::vector<double> us;
-  double deepest_m = 0.0, drift_m = 0.0, gain_J = 0.0;
+  double deepest_m = 0.0, gain_J = 0.0;
+  double drift_m = 0.0;  ///< largest displacement of a box in the second half
   std::size_t poses = 0, overlapping = 0;
   Vector3d moved_m = Vector3d::Zero();           ///< of the first box
   Vector3d velocity_m_per_s = Vector3d::Zero();  ///< of the first box, at the end
 };
 
 Figures run(const BoxScene& scene, Simulator& simulator, const CounterScale& scale) {
-  constexpr double kSettled_s = 0.5;
   Figures figures;
   std::vector<Pose> settled;
   double energy = energy_J(scene, simulator);
@@ -230,8 +230,8 @@ Figures run(const BoxScene& scene, Simulator& simulator, const CounterScale& sca
     const double after = energy_J(scene, simulator);
     figures.gain_J += std::max(0.0, after - energy);
     energy = after;
-    if (settled.empty() && static_cast<double>(k) * kStep_s >= kSettled_s) settled = now;
-    if (k + 1 == steps && !settled.empty())
+    if (k == steps / 2) settled = now;
+    if (k + 1 == steps)
       for (std::size_t i = 0; i < now.size(); ++i)
         figures.drift_m = std::max(figures.drift_m, (now[i].translation_m - settled[i].translation_m).norm());
   }

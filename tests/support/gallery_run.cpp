@@ -101,6 +101,11 @@ double run_figure(const GalleryRun& run, const std::string& quantity, double tim
     if (quantity == std::string("torque_") + kAxes[k] + "_mNm") return 1e3 * tick.F_out[3 + k];
   }
   if (quantity == "contacts") return tick.contacts;
+  // "body0_x_mm": the centre of a free body
+  constexpr std::size_t kBodyDigit = 4, kBodyAxis = 6, kPoseNumbers = 7;
+  if (quantity.starts_with("body") && quantity.size() == std::string("body0_x_mm").size())
+    return 1e3 * tick.X_WB.at(kPoseNumbers * static_cast<std::size_t>(quantity[kBodyDigit] - '0') +
+                              static_cast<std::size_t>(quantity[kBodyAxis] - 'x'));
   const Pose X_WP = pose_from_numbers(tick.X_WP), X_WQ = pose_from_numbers(tick.X_WQ);
   if (quantity == "depth_mm") return 1e3 * (X_WP.translation_m - X_WQ.translation_m).norm();
   const bool hand = quantity.rfind("hand_", 0) == 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -28,13 +29,39 @@ constexpr double kSeconds = 2.0;
 constexpr double kSeconds = 0.0;  // the whole script
 #endif
 
-/// Checks in exact arithmetic that the tool overlaps no obstacle.
+/// Checks in exact arithmetic that the tool overlaps no obstacle, and that free bodies overlap nothing.
 class Admissible {
  public:
   explicit Admissible(const SceneSettings& settings) : scene_(settings) {
     for (const MeshObstacle& obstacle : scene_.meshes())
       intersections_.push_back(std::make_unique<ExactIntersection>(scene_.tool_mesh()->surface.mesh(),
                                                                    obstacle.mesh->surface.mesh()));
+    for (std::size_t i = 0; i < scene_.bodies().size(); ++i) {
+      const TriangleMesh& body = scene_.bodies()[i].body.mesh;
+      tool_with_.push_back(std::make_unique<ExactIntersection>(scene_.tool_mesh()->surface.mesh(), body));
+      for (std::size_t k = 0; k < scene_.meshes().size(); ++k)
+        with_obstacles_.push_back(
+            {i, k, std::make_unique<ExactIntersection>(body, scene_.meshes()[k].mesh->surface.mesh())});
+      for (std::size_t j = 0; j < i; ++j)
+        with_bodies_.push_back(
+            {i, j, std::make_unique<ExactIntersection>(body, scene_.bodies()[j].body.mesh)});
+    }
+  }
+
+  bool bodies_at(const Pose& X_WT, const TickRecord& tick, double scene_time_s) const {
+    const auto body = [&](std::size_t i) {
+      std::array<double, 7> x{};
+      std::copy_n(tick.X_WB.begin() + static_cast<std::ptrdiff_t>(x.size() * i), x.size(), x.begin());
+      return pose_from_numbers(x);
+    };
+    for (std::size_t i = 0; i < tool_with_.size(); ++i)
+      if (tool_with_[i]->intersect(inverse(body(i)) * X_WT)) return false;
+    for (const Pair& pair : with_obstacles_)
+      if (pair.exact->intersect(inverse(scene_.meshes()[pair.b].X_WO_at(scene_time_s)) * body(pair.a)))
+        return false;
+    return std::none_of(with_bodies_.begin(), with_bodies_.end(), [&](const Pair& pair) {
+      return pair.exact->intersect(inverse(body(pair.b)) * body(pair.a));
+    });
   }
 
   bool at(const Pose& X_WT, double scene_time_s) const {
@@ -51,6 +78,12 @@ class Admissible {
   static constexpr double kRounding_m = 1e-12;  ///< tolerance of half-spaces, which have no clearance
   Scene scene_;
   std::vector<std::unique_ptr<ExactIntersection>> intersections_;
+  std::vector<std::unique_ptr<ExactIntersection>> tool_with_;  ///< each body
+  struct Pair {
+    std::size_t a, b;
+    std::unique_ptr<ExactIntersection> exact;
+  };
+  std::vector<Pair> with_obstacles_, with_bodies_;
 };
 
 std::vector<std::string> names() {
@@ -87,7 +120,9 @@ void check_scene(const std::string& name) {
     if (static_cast<ProxyInitialization>(run.ticks[i].proxy_initialization) != ProxyInitialization::complete)
       continue;
     INFO("tick " << i);
-    CHECK(admissible.at(pose_from_numbers(run.ticks[i].X_WQ), run.scene_time_s[i]));
+    const Pose X_WQ = pose_from_numbers(run.ticks[i].X_WQ);
+    CHECK(admissible.at(X_WQ, run.scene_time_s[i]));
+    CHECK(admissible.bodies_at(X_WQ, run.ticks[i], run.scene_time_s[i]));
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 
@@ -135,6 +170,9 @@ TEST_CASE("gallery: a staircase", "[gallery]") {
 TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
   check_scene("moving_obstacle");
 }
+TEST_CASE("gallery: a box that is pushed over a table", "[gallery]") {
+  check_scene("push_the_box");
+}
 
 TEST_CASE("a recording of a scene with generated meshes replays without other files", "[gallery][program]") {
   const TemporaryDirectory files;
@@ -153,8 +191,8 @@ TEST_CASE("a recording of a scene with generated meshes replays without other fi
 TEST_CASE("every gallery scene has a description, a repeating script, a viewpoint and a test", "[gallery]") {
   const std::vector<std::string> all = names();
   CHECK(all == std::vector<std::string>{"bolt_and_nut", "gear_pair", "hares", "key_in_lock",
-                                        "moving_obstacle", "paper_cube", "peg_in_hole", "staircase",
-                                        "thin_plate"});
+                                        "moving_obstacle", "paper_cube", "peg_in_hole", "push_the_box",
+                                        "staircase", "thin_plate"});
   for (const std::string& name : all) {
     INFO(name);
     const RunConfig plan = gallery_config(name);
