@@ -26,9 +26,10 @@ constexpr double kConverged_m = 1e-10;
 constexpr double kAccepted_m = 1e-9;
 /// Accepted violation of a cone in a Newton step [m].
 constexpr double kTolerance_m = 1e-11;
-/// Least gap of an admissible pose and of a contact that is held at less than the clearance, and the largest
-/// gap of a contact that touches, as multiples of the clearance.
+/// Least gap of an admissible pose, least gap at which a contact is held, which leaves room for the tolerance
+/// of a cone, and largest gap of a contact that touches, as multiples of the clearance.
 constexpr double kMinClearance = 0.2;
+constexpr double kLeastHold = 0.3;
 constexpr double kTouch = 1.1;
 /// Gap at which a sweep looks past the contacts that are held open, as a multiple of the clearance.
 constexpr double kBehind = 0.1;
@@ -139,7 +140,10 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
   if (clean) time_s_ = until_s;
   if (settings_.sleeps) fall_asleep();
   prefetch();
-  return clean ? Status::converged : Status::budget_spent;
+  const bool whole = std::all_of(bodies_.begin(), bodies_.end(), [](const Body& body) {
+    return body.weight_per_s2 == 0.0 || body.fraction == 1.0;
+  });
+  return clean && whole ? Status::converged : Status::budget_spent;
 }
 
 /// Sets the goals of all bodies and moves the contacts with the obstacles that move.
@@ -180,7 +184,7 @@ double BodyWorld::held_gap_m(const BodyContact& c, double opening_m) const noexc
   if (c.b == BodyContact::kFixed && pair_of(c).scene().has_moving_obstacles()) return kClearance_m;
   const Pose X_WB = c.b == BodyContact::kFixed ? Pose{} : bodies_[c.b].motion.X_WB;
   const double gap_m = geometry_of(c, bodies_[c.a].motion.X_WB, X_WB).gap_m;
-  return std::clamp(gap_m + opening_m, kMinClearance * kClearance_m, kClearance_m);
+  return std::clamp(gap_m + opening_m, kLeastHold * kClearance_m, kClearance_m);
 }
 
 /// A body without contact ends where its exact motion ends. One with contact moves at the velocity that it

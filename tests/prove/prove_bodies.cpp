@@ -15,7 +15,7 @@
 #include "tests/support/random_values.hpp"
 
 // Random scenes of free bodies, with and without a hand: nothing overlaps in exact arithmetic, and the bodies
-// gain no energy but from the tool and from gravity. METHOD, section 15.
+// gain no energy but from the tool and from gravity. core/METHOD.md, section 15.
 
 namespace {
 
