@@ -24,6 +24,8 @@ constexpr int kUnanswered = 2;
 constexpr double kConverged_m = 1e-10;
 /// A solve that did not end is accepted if no point moved farther in its last step [m].
 constexpr double kAccepted_m = 1e-9;
+/// Step of the differences for the curvature of a gap [m, rad].
+constexpr double kDifference = 1e-6;
 /// Accepted violation of a cone in a Newton step [m].
 constexpr double kTolerance_m = 1e-11;
 /// Least gap of an admissible pose, least gap at which a contact is held, which leaves room for the tolerance
@@ -365,36 +367,89 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
     const Body& body = bodies_[i];
     const Pose X_WB = acting_pose(i);
     block = body.block;
-    D.leftCols<3>() = (sign / std::sqrt(body.weight_per_s2 * body.M.mass_kg)) * Matrix3d::Identity();
-    // -hat(lever) R U^-1: the upper triangle U is inverted from the right
-    const Matrix3d turning =
+    FrictionCone::Block moved;
+    moved << sign * Matrix3d::Identity(),
         -sign * hat(at.point_W_m - X_WB.translation_m) * X_WB.rotation.toRotationMatrix();
-    D.rightCols<3>() =
-        body.root.transpose().triangularView<Eigen::Lower>().solve(turning.transpose()).transpose();
+    // The upper triangle is inverted from the right.
+    D = body.root.transpose().triangularView<Eigen::Lower>().solve(moved.transpose()).transpose();
   };
   set_block(c.a, 1.0, cone.a, cone.D_a);
   if (c.b != BodyContact::kFixed) set_block(c.b, -1.0, cone.b, cone.D_b);
   return cone;
 }
 
+/// Sets the root of a body's metric at q. Returns the step without contacts, in coordinates in which the
+/// metric is the identity.
+Vector6d BodyWorld::descent(std::size_t i) noexcept {
+  Body& body = bodies_[i];
+  Quaterniond E = body.X_goal.rotation.conjugate() * body.X_WQ.rotation;
+  if (E.w() < 0.0) E.coeffs() = -E.coeffs();
+  const Vector3d v = E.vec(), Hv = body.M.H_kg_m2 * v;
+  // METHOD (14), (15) with the factor kappa / 2
+  const Matrix3d G = 0.5 * (E.w() * Matrix3d::Identity() + hat(v));
+  const double translational = body.weight_per_s2 * body.M.mass_kg;
+  Vector6d gradient;
+  gradient << translational * (body.X_WQ.translation_m - body.X_goal.translation_m),
+      2.0 * body.weight_per_s2 * (E.w() * Hv - v.cross(Hv));
+  Matrix6d metric = Matrix6d::Zero();
+  metric.diagonal().head<3>().setConstant(translational);
+  metric.bottomRightCorner<3, 3>() = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
+  if (i != 0 || !root_with_curvature(metric)) body.root = metric.llt().matrixU();
+  body.root.transpose().triangularView<Eigen::Lower>().solveInPlace(gradient);
+  return -gradient;
+}
+
+/// The root of the tool's metric less the curvature of its gaps times their loads, METHOD (113). Its loads
+/// and levers are large against its spring, so without the curvature Newton's method converges slowly or not
+/// at all. Returns false if that is not positive definite, also with the gradients of the gaps added, (40).
+bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
+  Matrix6d W = metric, across = Matrix6d::Zero();
+  for (const std::size_t k : island_contacts_) {
+    const BodyContact& c = contacts_[k];
+    const double load_N = c.a == 0 ? c.force_W_N.dot(geometry(c).n_W) : 0.0;
+    if (!(load_N > 0.0)) continue;
+    const Vector6d gradient = gap_gradient(c, Vector6d::Zero());
+    across += gradient * gradient.transpose();
+    Matrix6d curvature;
+    for (int axis = 0; axis < 6; ++axis) {
+      const Vector6d step = kDifference * Vector6d::Unit(axis);
+      curvature.col(axis) = (gap_gradient(c, step) - gap_gradient(c, -step)) / (2.0 * kDifference);
+    }
+    W -= 0.5 * load_N * (curvature + curvature.transpose());
+    // Friction, at its point of the tool: METHOD (24) with the normal in its place
+    const ContactGeometry at = geometry(c);
+    const Pose X_TW = inverse(bodies_[0].X_WQ);
+    const Vector3d f = X_TW.rotation * (c.force_W_N - load_N * at.n_W), p = X_TW * at.point_W_m;
+    W.bottomRightCorner<3, 3>() -=
+        0.5 * (f * p.transpose() + p * f.transpose()) - f.dot(p) * Matrix3d::Identity();
+  }
+  double stiffening = 0.0;
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    const Eigen::LLT<Matrix6d> llt(W + stiffening * across);
+    if (llt.info() == Eigen::Success) {
+      bodies_[0].root = llt.matrixU();
+      return true;
+    }
+    stiffening = stiffening == 0.0 ? 4.0 * W.lpNorm<Eigen::Infinity>() : 30.0 * stiffening;
+  }
+  return false;
+}
+
+/// Gradient of a gap of the tool in its translation in W and its rotation in T, at a step from q.
+Vector6d BodyWorld::gap_gradient(const BodyContact& c, const Vector6d& step) const noexcept {
+  Pose X_WT = bodies_[0].X_WQ;
+  X_WT.translation_m += step.head<3>();
+  X_WT.rotation = (X_WT.rotation * rotation_from(step.tail<3>())).normalized();
+  const ContactGeometry at = geometry_of(c, X_WT, c.b == BodyContact::kFixed ? Pose{} : bodies_[c.b].X_WQ);
+  Vector6d gradient;
+  gradient << at.n_W, X_WT.rotation.conjugate() * (at.point_W_m - X_WT.translation_m).cross(at.n_W);
+  return gradient;
+}
+
 /// One Newton step of an island, METHOD (99), (105). Returns true if it moved no point.
 bool BodyWorld::newton_step(Friction friction) noexcept {
   cones_.clear(island_bodies_.size());
-  for (const std::size_t i : island_bodies_) {
-    Body& body = bodies_[i];
-    Quaterniond E = body.X_goal.rotation.conjugate() * body.X_WQ.rotation;
-    if (E.w() < 0.0) E.coeffs() = -E.coeffs();
-    const Vector3d v = E.vec(), Hv = body.M.H_kg_m2 * v;
-    // METHOD (14), (15) with the factor kappa / 2
-    const Matrix3d G = 0.5 * (E.w() * Matrix3d::Identity() + hat(v));
-    const Matrix3d metric = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
-    body.root = metric.llt().matrixU();
-    const Vector3d torque = 2.0 * body.weight_per_s2 * (E.w() * Hv - v.cross(Hv));
-    auto z0 = cones_.z0(body.block);
-    z0.head<3>() = std::sqrt(body.weight_per_s2 * body.M.mass_kg) *
-                   (body.X_goal.translation_m - body.X_WQ.translation_m);
-    z0.tail<3>() = -body.root.transpose().triangularView<Eigen::Lower>().solve(torque);
-  }
+  for (const std::size_t i : island_bodies_) cones_.z0(bodies_[i].block) = descent(i);
   for (const std::size_t k : island_contacts_) {
     const BodyContact& contact = contacts_[k];
     for (const Vector3d& normal : contact.active_normals) cones_.suggest(cones_.cone_count(), normal);
@@ -406,9 +461,8 @@ bool BodyWorld::newton_step(Friction friction) noexcept {
   double change_m = 0.0;
   for (const std::size_t i : island_bodies_) {
     Body& body = bodies_[i];
-    const Vector6d z = cones_.z(body.block);
-    const Vector3d shift = z.head<3>() / std::sqrt(body.weight_per_s2 * body.M.mass_kg);
-    const Vector3d turn = body.root.triangularView<Eigen::Upper>().solve(z.tail<3>());
+    const Vector6d step = body.root.triangularView<Eigen::Upper>().solve(cones_.z(body.block));
+    const Vector3d shift = step.head<3>(), turn = step.tail<3>();
     body.X_WQ.translation_m += shift;
     body.X_WQ.rotation = (body.X_WQ.rotation * rotation_from(turn)).normalized();
     change_m = std::max(shift.norm() + body.radius_m * turn.norm(), change_m);

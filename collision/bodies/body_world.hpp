@@ -120,7 +120,7 @@ class BodyWorld {
     bool asleep = false;                   ///< rests until something touches its island
     std::uint16_t calm_steps = 0;          ///< consecutive steps in which it hardly moved
     std::size_t block = 0;                 ///< number of the body in the problem of its island
-    Matrix3d root = Matrix3d::Identity();  ///< root of the rotational part of the metric
+    Matrix6d root = Matrix6d::Identity();  ///< upper triangular root of the metric at q
   };
 
   enum class Friction : std::uint8_t { coulomb, frozen, none };
@@ -135,6 +135,9 @@ class BodyWorld {
   bool solve_island(std::size_t island) noexcept;
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
   bool newton_step(Friction friction) noexcept;
+  Vector6d descent(std::size_t body) noexcept;
+  bool root_with_curvature(const Matrix6d& metric) noexcept;
+  Vector6d gap_gradient(const BodyContact& contact, const Vector6d& step) const noexcept;
   FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
   Vector3d displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept;
   Vector3d other_displacement_m(const BodyContact& contact, const Vector3d& point_W_m) const noexcept;
