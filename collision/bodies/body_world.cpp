@@ -48,6 +48,11 @@ constexpr double kMinFraction = 1.0 / 256.0;
 constexpr double kCalmSpeed_m_per_s = 1e-5;
 constexpr std::uint16_t kCalmSteps = 100;
 
+/// A U^-1 for an upper triangle U.
+Matrix3d right_divided(const Matrix3d& A, const Matrix3d& U) noexcept {
+  return U.transpose().triangularView<Eigen::Lower>().solve(A.transpose()).transpose();
+}
+
 double shorter(double fraction) noexcept {
   return fraction > kMinFraction ? kShorter * fraction : 0.0;
 }
@@ -370,8 +375,10 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
     FrictionCone::Block moved;
     moved << sign * Matrix3d::Identity(),
         -sign * hat(at.point_W_m - X_WB.translation_m) * X_WB.rotation.toRotationMatrix();
-    // The upper triangle is inverted from the right.
-    D = body.root.transpose().triangularView<Eigen::Lower>().solve(moved.transpose()).transpose();
+    // The upper triangle is inverted from the right, by blocks.
+    const Matrix3d left = right_divided(moved.leftCols<3>(), body.root.topLeftCorner<3, 3>());
+    D << left, right_divided(moved.rightCols<3>() - left * body.root.topRightCorner<3, 3>(),
+                             body.root.bottomRightCorner<3, 3>());
   };
   set_block(c.a, 1.0, cone.a, cone.D_a);
   if (c.b != BodyContact::kFixed) set_block(c.b, -1.0, cone.b, cone.D_b);
@@ -394,7 +401,11 @@ Vector6d BodyWorld::descent(std::size_t i) noexcept {
   Matrix6d metric = Matrix6d::Zero();
   metric.diagonal().head<3>().setConstant(translational);
   metric.bottomRightCorner<3, 3>() = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
-  if (i != 0 || !root_with_curvature(metric)) body.root = metric.llt().matrixU();
+  if (i != 0 || !root_with_curvature(metric)) {
+    body.root = Matrix6d::Zero();
+    body.root.diagonal().head<3>().setConstant(std::sqrt(translational));
+    body.root.bottomRightCorner<3, 3>() = Matrix3d(metric.bottomRightCorner<3, 3>()).llt().matrixU();
+  }
   body.root.transpose().triangularView<Eigen::Lower>().solveInPlace(gradient);
   return -gradient;
 }
