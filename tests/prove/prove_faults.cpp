@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -22,10 +23,21 @@ struct Outcome {
   std::string broken;
 };
 
+/// Puts a box that moves by itself between the tool and the table.
+void add_box(RunConfig& plan) {
+  BodySettings box;
+  box.name = "box";
+  box.shape.generated = GeneratedMesh{"box", 12, 1, {0.08, 0.08, 0.02}};
+  box.shape.mass_kg = 0.2;
+  box.X_WM.translation_m = {0.0, 0.0, 0.0101};
+  plan.scene.bodies.push_back(box);
+}
+
 /// Runs one schedule, which its seed determines completely.
-Outcome run(std::uint64_t seed) {
+Outcome run(std::uint64_t seed, bool bodies) {
   RandomValues random(seed);
-  FaultRig rig(static_cast<Phase>(random.integer(0, 2)));
+  FaultRig rig(static_cast<Phase>(random.integer(0, 2)),
+               bodies ? add_box : std::function<void(RunConfig&)>());
   const auto& states = rig_states();
   Outcome outcome;
   const State state =
@@ -87,12 +99,14 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);
   app.add_option("--seed", seed);
+  bool bodies = false;
+  app.add_flag("--bodies", bodies, "the hand presses a box that moves by itself on the table");
   CLI11_PARSE(app, argc, argv);
   std::uint64_t ticks = 0;
   long violations = 0;
   for (long i = 0; i < schedules; ++i) {
     const std::uint64_t one = seed * 1'000'003 + static_cast<std::uint64_t>(i);
-    const Outcome outcome = run(one);
+    const Outcome outcome = run(one, bodies);
     ticks += outcome.ticks;
     if (outcome.broken.empty()) continue;
     if (++violations <= 20)
