@@ -27,7 +27,7 @@ struct FrictionCone {
   Block D_a = Block::Zero(), D_b = Block::Zero();
   Vector3d n = Vector3d::UnitZ();      ///< unit normal from b to a
   double h_m = 0.0;                    ///< gap at z = 0 [m]
-  double s_m = 0.0;                    ///< lift of the cone, METHOD (106) [m]
+  double s_m = 0.0;                    ///< lift s of the cone along n, METHOD (105) [m]
   Vector3d slip_m = Vector3d::Zero();  ///< tangential displacement at z = 0 [m]
   double mu = 0.0;                     ///< coefficient of friction
 };
@@ -56,7 +56,7 @@ class ConeProjection {
   /// The components of z0 for a body.
   Eigen::Ref<Vector6d> z0(std::size_t body) noexcept { return z0_.segment<kBlock>(at(body)); }
 
-  /// Names a half-space that solve() tries first, by the normal that normals() returned for it.
+  /// Names a half-space that solve() tries first, by the normal that active_normals() returned for it.
   void suggest(std::size_t cone, const Vector3d& normal) noexcept;
   /// Solves with the lifts that the cones have. tolerance_m: accepted violation of a cone [m].
   Status solve(double tolerance_m) noexcept;
@@ -131,15 +131,16 @@ class ConeProjection {
   std::vector<FrictionCone> cones_;
   std::vector<HalfSpace> active_;
   std::vector<HalfSpace> suggested_;  ///< only their cones and normals
-  std::vector<Unknown> unknowns_;
+  std::vector<Unknown> unknowns_;     ///< of the Newton step for Coulomb's law
   Eigen::VectorXd z0_, z_, z_before_, rest_, r_, d_;
-  Eigen::MatrixXd Q_;  ///< orthonormal columns
-  Eigen::MatrixXd R_;  ///< upper triangle: active normals = Q R
-  Eigen::MatrixXd J_;  ///< of newton_step()
-  Eigen::VectorXd x_, d_x_;
-  std::vector<Eigen::Index> pivots_;
-  std::vector<Vector3d> forces_;
-  std::vector<char> left_out_;
+  Eigen::MatrixXd Q_;        ///< orthonormal columns
+  Eigen::MatrixXd R_;        ///< upper triangle: active normals = Q R
+  Eigen::MatrixXd J_;        ///< Jacobian of the Newton step for Coulomb's law
+  Eigen::VectorXd x_, d_x_;  ///< right side of the Newton step, and its solution
+  std::vector<Eigen::Index>
+      pivots_;                    ///< row of the pivot of each column of J_; -1: the column depends on others
+  std::vector<Vector3d> forces_;  ///< force of each cone on its body a
+  std::vector<char> left_out_;    ///< cones that Newton's method found with a negative load
   std::size_t steps_ = 0;
 };
 

@@ -13,16 +13,16 @@
 namespace wrenchd {
 namespace {
 
-/// Newton steps of an island: at most this number with the slip of the last iterate, METHOD (106), then at
-/// most this number with the relaxed cone.
+/// Most Newton steps of an island with Coulomb's friction, METHOD (106), and then most without friction.
 constexpr int kNewtonSteps = 12;
-/// Newton steps of an island after the work limit of the solver.
+/// Most Newton steps of an island if the work limit of the solver is reached.
 constexpr int kLateSteps = 8;
-/// Newton steps without an answer to Coulomb's law, after which the lifts of the cones stay as they are.
+/// After this number of Newton steps without an answer to Coulomb's law, the lifts of the cones stay as they
+/// are.
 constexpr int kUnanswered = 2;
 /// A solve ends if no point moved farther than this in a Newton step [m]. It is small against the clearance.
 constexpr double kConverged_m = 1e-10;
-/// A solve that did not end is accepted if no point moved farther in its last step [m].
+/// A solve that did not converge is accepted if its last Newton step moved no point farther than this [m].
 constexpr double kAccepted_m = 1e-9;
 /// Step of the differences for the curvature of a gap [m, rad].
 constexpr double kDifference = 1e-6;
@@ -35,10 +35,10 @@ constexpr double kLeastHold = 0.3;
 constexpr double kTouch = 1.1;
 /// Gap at which a sweep looks past the contacts that are held open, as a multiple of the clearance.
 constexpr double kBehind = 0.1;
-/// What the gap of a contact below the clearance may open in a step, as a multiple of the clearance.
+/// A gap below the clearance opens by at most this multiple of the clearance in a step.
 constexpr double kOpening = 0.01;
-/// Contacts with a gap below this multiple of the clearance at the start are added where a sweep finds too
-/// few.
+/// If a sweep finds an overlap but no contact, the contacts with a gap below this multiple of the clearance
+/// at the start are added.
 constexpr double kNear = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
@@ -53,6 +53,7 @@ Matrix3d right_divided(const Matrix3d& A, const Matrix3d& U) noexcept {
   return U.transpose().triangularView<Eigen::Lower>().solve(A.transpose()).transpose();
 }
 
+/// The next shorter fraction of a path; 0 after the shortest.
 double shorter(double fraction) noexcept {
   return fraction > kMinFraction ? kShorter * fraction : 0.0;
 }
@@ -357,7 +358,7 @@ Vector3d BodyWorld::slip_m(const BodyContact& c, const ContactGeometry& at) cons
   return moved - at.n_W.dot(moved) * at.n_W;
 }
 
-/// METHOD (105). Without friction: (107).
+/// The cone of a contact at q, METHOD (105), or its half-space without friction, METHOD (107).
 FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const noexcept {
   const ContactGeometry at = acting_geometry(c);
   FrictionCone cone;

@@ -202,8 +202,8 @@ struct Figures {
   double deepest_m = 0.0, gain_J = 0.0;
   double drift_m = 0.0;  ///< largest displacement of a box in the second half
   std::size_t poses = 0, overlapping = 0;
-  Vector3d moved_m = Vector3d::Zero();           ///< of the first box
-  Vector3d velocity_m_per_s = Vector3d::Zero();  ///< of the first box, at the end
+  Vector3d moved_m = Vector3d::Zero();           ///< displacement of the first box in the run
+  Vector3d velocity_m_per_s = Vector3d::Zero();  ///< velocity of the first box at the end of the run
 };
 
 Figures run(const BoxScene& scene, Simulator& simulator, const CounterScale& scale) {
@@ -276,17 +276,18 @@ BoxScene sliding() {
   return scene;
 }
 
-/// A box on a slope: gravity is turned instead.
+/// A box on a slope. The plane stays level, and gravity is turned.
 BoxScene slope(double share) {
   const double angle = share * std::atan(0.5);
-  return {share < 1.0 ? "a box on a slope, 0.5 % below the angle of friction" : "the same, 0.5 % above",
+  return {share < 1.0 ? "a box on a slope, 0.5 % below the angle of friction"
+                      : "a box on a slope, 0.5 % above the angle of friction",
           {cube({0.0, 0.0, 0.02 + 1e-9})},
           0.5,
           kGravity_m_per_s2 * Vector3d(std::sin(angle), 0.0, -std::cos(angle)),
           2.0};
 }
 
-/// The figure of a scene that has a closed form: the name and the value of a row.
+/// Returns the error of a run against the closed form of its scene [%], or "-" if the scene has none.
 std::string against_closed_form(const BoxScene& scene, const Figures& figures) {
   if (scene.name == sliding().name) {
     const double expected_m =

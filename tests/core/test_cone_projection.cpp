@@ -43,26 +43,41 @@ struct RandomProblem {
   }
 };
 
+/// What a solved problem says about one cone.
+struct Answer {
+  Vector3d force;
+  double load;
+  Vector3d moved, slip;
+};
+
+Answer answer_of(const ConeProjection& problem, const FrictionCone& cone, std::size_t k) {
+  Vector3d moved = cone.D_a * problem.z(cone.a);
+  if (cone.b != FrictionCone::kFixed) moved += cone.D_b * problem.z(cone.b);
+  const Vector3d force = problem.force(k);
+  return {force, cone.n.dot(force), moved, moved - cone.n.dot(moved) * cone.n + cone.slip_m};
+}
+
+/// The forces of the cones move each body from z0 to its answer.
+void check_balance(const ConeProjection& problem, const Cones& cones, const std::vector<Vector6d>& z0) {
+  std::vector<Vector6d> rest(z0.size());
+  for (std::size_t i = 0; i < z0.size(); ++i) rest[i] = problem.z(i) - z0[i];
+  for (std::size_t k = 0; k < cones.size(); ++k) {
+    rest[cones[k].a] -= cones[k].D_a.transpose() * problem.force(k);
+    if (cones[k].b != FrictionCone::kFixed) rest[cones[k].b] -= cones[k].D_b.transpose() * problem.force(k);
+  }
+  for (const Vector6d& one : rest) CHECK(one.norm() < 1e-8);
+}
+
 /// The conditions that only the answer of a convex problem fulfils.
 void check_optimal(const ConeProjection& problem, const Cones& cones, const std::vector<Vector6d>& z0) {
-  std::vector<Vector6d> pull(z0.size());
-  for (std::size_t i = 0; i < z0.size(); ++i) pull[i] = problem.z(i) - z0[i];
+  check_balance(problem, cones, z0);
   for (std::size_t k = 0; k < cones.size(); ++k) {
     const FrictionCone& cone = cones[k];
-    const Vector3d force = problem.force(k);
-    const double load = cone.n.dot(force);
-    Vector3d moved = cone.D_a * problem.z(cone.a);
-    pull[cone.a] -= cone.D_a.transpose() * force;
-    if (cone.b != FrictionCone::kFixed) {
-      moved += cone.D_b * problem.z(cone.b);
-      pull[cone.b] -= cone.D_b.transpose() * force;
-    }
-    const Vector3d slip = moved - cone.n.dot(moved) * cone.n + cone.slip_m;
+    const auto [force, load, moved, slip] = answer_of(problem, cone, k);
     CHECK(cone.n.dot(moved) + cone.h_m >= cone.mu * slip.norm() - 1e-9);
     CHECK((force - load * cone.n).norm() <= cone.mu * load + 1e-9);  // Coulomb's cone
     CHECK(std::abs(force.dot(moved) + load * cone.h_m + (force - load * cone.n).dot(cone.slip_m)) < 1e-7);
   }
-  for (const Vector6d& rest : pull) CHECK(rest.norm() < 1e-8);
 }
 
 TEST_CASE("the answer is the nearest step in all cones", "[cone_projection]") {
@@ -93,19 +108,10 @@ TEST_CASE("the answer is the nearest step in all cones", "[cone_projection]") {
 /// Coulomb's law: no gap is negative, what is loaded has none, and friction is within its cone, opposite to
 /// the slip.
 void check_coulomb(const ConeProjection& problem, const Cones& cones, const std::vector<Vector6d>& z0) {
-  std::vector<Vector6d> pull(z0.size());
-  for (std::size_t i = 0; i < z0.size(); ++i) pull[i] = problem.z(i) - z0[i];
+  check_balance(problem, cones, z0);
   for (std::size_t k = 0; k < cones.size(); ++k) {
     const FrictionCone& cone = cones[k];
-    const Vector3d force = problem.force(k);
-    const double load = cone.n.dot(force);
-    Vector3d moved = cone.D_a * problem.z(cone.a);
-    pull[cone.a] -= cone.D_a.transpose() * force;
-    if (cone.b != FrictionCone::kFixed) {
-      moved += cone.D_b * problem.z(cone.b);
-      pull[cone.b] -= cone.D_b.transpose() * force;
-    }
-    const Vector3d slip = moved - cone.n.dot(moved) * cone.n + cone.slip_m;
+    const auto [force, load, moved, slip] = answer_of(problem, cone, k);
     const double gap_m = cone.n.dot(moved) + cone.h_m;
     INFO("cone " << k << ", gap " << gap_m << ", load " << load << ", slip " << slip.norm());
     CHECK(gap_m >= -1e-9);
@@ -116,7 +122,6 @@ void check_coulomb(const ConeProjection& problem, const Cones& cones, const std:
     CHECK(std::abs(friction.dot(slip) + cone.mu * load * slip.norm()) < 1e-7);
     CHECK(problem.lift_m(k) == Approx(cone.mu * slip.norm()).margin(1e-12));
   }
-  for (const Vector6d& rest : pull) CHECK(rest.norm() < 1e-8);
 }
 
 TEST_CASE(

@@ -30,7 +30,7 @@ struct Options {
   long scenes = 20;
   std::uint64_t seed = 1;
   double seconds = 1.0;
-  int overlap_ticks = 20;  ///< every how many ticks all pairs are tested in exact arithmetic
+  int overlap_ticks = 20;  ///< ticks between two tests of all pairs in exact arithmetic
   bool verbose = false;
 };
 
@@ -102,7 +102,7 @@ class RandomScene {
     }
   }
 
-  /// Adds the figures of its run. Returns its gain of energy [J].
+  /// Runs the scene and adds its figures to the totals. Returns the energy that the bodies gained [J].
   double run(Totals& totals) {
     double gain_J = 0.0;
     const int ticks = static_cast<int>(options_.seconds / kTick_s);
