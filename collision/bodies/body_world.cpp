@@ -123,6 +123,11 @@ void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
   std::erase_if(contacts_, [&](const BodyContact& c) { return c.a == body || c.b == body; });
   for (const auto& pair : pairs_)
     if (pair->a() == body || pair->b() == body) pair->reset();
+  return_.reset();
+  constexpr double kSame = 1e-12;  // [m, rad]
+  if (grasp_ &&
+      log(inverse(bodies_[0].motion.X_WB * grasp_->X_TB) * bodies_[grasp_->body].motion.X_WB).norm() > kSame)
+    grasp_.reset();
 }
 
 double BodyWorld::energy_J() const noexcept {
@@ -145,6 +150,7 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
   }
   if (!clean) hold_all();
   apply_impulses();
+  finish_grasp();
   if (clean) time_s_ = until_s;
   if (settings_.sleeps) fall_asleep();
   prefetch();
@@ -160,6 +166,10 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
   for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
   contacts_before_ = contacts_;  // equal capacities: no allocation
   time_before_s_ = time_s_;
+  grasp_before_ = grasp_;
+  return_before_ = return_;
+  tool_load_before_ = tool_load_;
+  grasp_broke_ = false;
   budget_ = {settings_.node_visits};
   solver_steps_ = 0;
   last_change_m_ = 0.0;
@@ -173,13 +183,23 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
   Body& tool = bodies_[0];
   tool.weight_per_s2 = hand ? hand->stiffness_per_s2 : 0.0;
   if (hand) X_WP_ = hand->X_WP;
-  if (!hand) std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
+  if (!hand) {
+    std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
+    let_go();
+    return_.reset();
+    tool_load_ = {};
+  }
+  advance_return();
   dropped_.clear();
   for (BodyContact& contact : contacts_) {
     contact.stays = false;
     contact.last_force_W_N = contact.force_W_N;
     bodies_[contact.a].touches = true;
     if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
+  }
+  if (grasp_) {
+    wake(grasp_->body);
+    bodies_[0].touches = bodies_[grasp_->body].touches = true;
   }
   for (BodyContact& contact : contacts_) contact.hold_m = held_gap_m(contact, kOpening * kClearance_m);
   move_contacts(time_s_, until_s_);
@@ -204,7 +224,7 @@ void BodyWorld::set_goal(Body& body) noexcept {
     body.X_goal = body.motion.X_WB;
   } else if (&body == &bodies_[0]) {
     body.free = body.motion;
-    body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_WP_, body.fraction) : X_WP_;
+    body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, tool_goal(), body.fraction) : tool_goal();
   } else {
     body.step_s = body.fraction * dt_s_;
     if (body.step_s == 0.0) return hold(body);
@@ -251,6 +271,7 @@ void BodyWorld::find_islands() noexcept {
   for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = i;
   for (const BodyContact& c : contacts_)
     if (c.b != BodyContact::kFixed) bodies_[root_of(c.b)].island = root_of(c.a);
+  if (grasp_) bodies_[root_of(grasp_->body)].island = root_of(0);
   for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = root_of(i);
 }
 
@@ -285,18 +306,21 @@ bool BodyWorld::solve_island(std::size_t island) noexcept {
   island_contacts_.clear();
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     if (bodies_[i].island != island || bodies_[i].weight_per_s2 == 0.0) continue;
-    bodies_[i].block = island_bodies_.size();
     bodies_[i].solved = true;
+    if (holds(i)) continue;  // moves with the tool
+    bodies_[i].block = island_bodies_.size();
     island_bodies_.push_back(i);
   }
+  const bool holding = grasp_ && bodies_[grasp_->body].island == island;
   for (std::size_t k = 0; k < contacts_.size(); ++k)
     if (bodies_[contacts_[k].a].island == island) island_contacts_.push_back(k);
   if (bodies_[island].fraction == 0.0) {
     for (const std::size_t k : island_contacts_) contacts_[k].force_W_N.setZero();
     for (const std::size_t i : island_bodies_) hold(bodies_[i]);
+    if (holding) hold(bodies_[grasp_->body]);
     return true;
   }
-  if (island_contacts_.empty()) {
+  if (island_contacts_.empty() && !holding) {
     for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].X_goal;
     return true;
   }
@@ -312,6 +336,7 @@ bool BodyWorld::solve_island(std::size_t island) noexcept {
     if (newton_step(Friction::none)) break;
   if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
   for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].motion.X_WB;
+  if (holding) bodies_[grasp_->body].X_WQ = bodies_[grasp_->body].motion.X_WB;
   return false;
 }
 
@@ -321,10 +346,10 @@ ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
 }
 
 /// The pose at which a contact acts on a body: half way for a free body, so that the contact does the work of
-/// its gap, METHOD (103); q for the tool, whose wrench is the gradient at q.
+/// its gap, METHOD (103); q for the tool and what it holds, whose wrench is the gradient at q.
 Pose BodyWorld::acting_pose(std::size_t body) const noexcept {
   const Body& one = bodies_[body];
-  return body == 0 ? one.X_WQ : between(one.motion.X_WB, one.X_WQ, 0.5);
+  return moves_with_tool(body) ? one.X_WQ : between(one.motion.X_WB, one.X_WQ, 0.5);
 }
 
 ContactGeometry BodyWorld::acting_geometry(const BodyContact& contact) const noexcept {
@@ -370,8 +395,8 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
     cone.s_m = c.mu * c.slip_m;
   }
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
-    const Body& body = bodies_[i];
-    const Pose X_WB = acting_pose(i);
+    const Body& body = bodies_[mover_of(i)];
+    const Pose X_WB = acting_pose(mover_of(i));
     block = body.block;
     FrictionCone::Block moved;
     moved << sign * Matrix3d::Identity(),
@@ -386,26 +411,44 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
   return cone;
 }
 
+/// Gradient of kappa T / 2 at q, METHOD (14), in the translation in W and the rotation in the body frame.
+Vector6d BodyWorld::pull_gradient(const Body& body, const Pose& X_goal) noexcept {
+  Quaterniond E = X_goal.rotation.conjugate() * body.X_WQ.rotation;
+  if (E.w() < 0.0) E.coeffs() = -E.coeffs();
+  const Vector3d v = E.vec(), Hv = body.M.H_kg_m2 * v;
+  Vector6d gradient;
+  gradient << body.weight_per_s2 * body.M.mass_kg * (body.X_WQ.translation_m - X_goal.translation_m),
+      2.0 * body.weight_per_s2 * (E.w() * Hv - v.cross(Hv));
+  return gradient;
+}
+
+/// The metric of a body at q, METHOD (15), with the factor kappa / 2.
+Matrix6d BodyWorld::metric_of(const Body& body) noexcept {
+  Quaterniond E = body.X_goal.rotation.conjugate() * body.X_WQ.rotation;
+  if (E.w() < 0.0) E.coeffs() = -E.coeffs();
+  const Matrix3d G = 0.5 * (E.w() * Matrix3d::Identity() + hat(E.vec()));
+  Matrix6d metric = Matrix6d::Zero();
+  metric.diagonal().head<3>().setConstant(body.weight_per_s2 * body.M.mass_kg);
+  metric.bottomRightCorner<3, 3>() = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
+  return metric;
+}
+
 /// Sets the root of a body's metric at q. Returns the step without contacts, in coordinates in which the
 /// metric is the identity.
 Vector6d BodyWorld::descent(std::size_t i) noexcept {
   Body& body = bodies_[i];
-  Quaterniond E = body.X_goal.rotation.conjugate() * body.X_WQ.rotation;
-  if (E.w() < 0.0) E.coeffs() = -E.coeffs();
-  const Vector3d v = E.vec(), Hv = body.M.H_kg_m2 * v;
-  // METHOD (14), (15) with the factor kappa / 2
-  const Matrix3d G = 0.5 * (E.w() * Matrix3d::Identity() + hat(v));
-  const double translational = body.weight_per_s2 * body.M.mass_kg;
-  Vector6d gradient;
-  gradient << translational * (body.X_WQ.translation_m - body.X_goal.translation_m),
-      2.0 * body.weight_per_s2 * (E.w() * Hv - v.cross(Hv));
-  Matrix6d metric = Matrix6d::Zero();
-  metric.diagonal().head<3>().setConstant(translational);
-  metric.bottomRightCorner<3, 3>() = 4.0 * body.weight_per_s2 * (G.transpose() * body.M.H_kg_m2 * G);
+  Vector6d gradient = pull_gradient(body, body.X_goal);
+  Matrix6d metric = metric_of(body);
+  const bool holding = i == 0 && grasp_;
+  if (holding) add_held(gradient, metric);
   if (i != 0 || !root_with_curvature(metric)) {
-    body.root = Matrix6d::Zero();
-    body.root.diagonal().head<3>().setConstant(std::sqrt(translational));
-    body.root.bottomRightCorner<3, 3>() = Matrix3d(metric.bottomRightCorner<3, 3>()).llt().matrixU();
+    if (holding) {
+      body.root = metric.llt().matrixU();
+    } else {
+      body.root = Matrix6d::Zero();
+      body.root.diagonal().head<3>() = metric.diagonal().head<3>().cwiseSqrt();
+      body.root.bottomRightCorner<3, 3>() = Matrix3d(metric.bottomRightCorner<3, 3>()).llt().matrixU();
+    }
   }
   body.root.transpose().triangularView<Eigen::Lower>().solveInPlace(gradient);
   return -gradient;
@@ -418,7 +461,9 @@ bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
   Matrix6d W = metric, across = Matrix6d::Zero();
   for (const std::size_t k : island_contacts_) {
     const BodyContact& c = contacts_[k];
-    const double load_N = c.a == 0 ? c.force_W_N.dot(geometry(c).n_W) : 0.0;
+    const bool of_tool = moves_with_tool(c.a);
+    if (of_tool == (c.b != BodyContact::kFixed && moves_with_tool(c.b))) continue;
+    const double load_N = c.force_W_N.dot(geometry(c).n_W);
     if (!(load_N > 0.0)) continue;
     const Vector6d gradient = gap_gradient(c, Vector6d::Zero());
     across += gradient * gradient.transpose();
@@ -431,7 +476,8 @@ bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
     // Friction, at its point of the tool: METHOD (24) with the normal in its place
     const ContactGeometry at = geometry(c);
     const Pose X_TW = inverse(bodies_[0].X_WQ);
-    const Vector3d f = X_TW.rotation * (c.force_W_N - load_N * at.n_W), p = X_TW * at.point_W_m;
+    const Vector3d friction_W_N = c.force_W_N - load_N * at.n_W;
+    const Vector3d f = X_TW.rotation * (of_tool ? friction_W_N : -friction_W_N), p = X_TW * at.point_W_m;
     W.bottomRightCorner<3, 3>() -=
         0.5 * (f * p.transpose() + p * f.transpose()) - f.dot(p) * Matrix3d::Identity();
   }
@@ -447,14 +493,21 @@ bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
   return false;
 }
 
-/// Gradient of a gap of the tool in its translation in W and its rotation in T, at a step from q.
+/// Gradient of a gap of the tool, or of what it holds, in the tool's translation in W and its rotation in T,
+/// at a step from q.
 Vector6d BodyWorld::gap_gradient(const BodyContact& c, const Vector6d& step) const noexcept {
   Pose X_WT = bodies_[0].X_WQ;
   X_WT.translation_m += step.head<3>();
   X_WT.rotation = (X_WT.rotation * rotation_from(step.tail<3>())).normalized();
-  const ContactGeometry at = geometry_of(c, X_WT, c.b == BodyContact::kFixed ? Pose{} : bodies_[c.b].X_WQ);
+  const auto pose_of = [&](std::size_t i) {
+    if (i == BodyContact::kFixed) return Pose{};
+    if (i == 0) return X_WT;
+    return holds(i) ? X_WT * grasp_->X_TB : bodies_[i].X_WQ;
+  };
+  const ContactGeometry at = geometry_of(c, pose_of(c.a), pose_of(c.b));
+  const Vector3d n_W = moves_with_tool(c.a) ? at.n_W : -at.n_W;
   Vector6d gradient;
-  gradient << at.n_W, X_WT.rotation.conjugate() * (at.point_W_m - X_WT.translation_m).cross(at.n_W);
+  gradient << n_W, X_WT.rotation.conjugate() * (at.point_W_m - X_WT.translation_m).cross(n_W);
   return gradient;
 }
 
@@ -477,7 +530,11 @@ bool BodyWorld::newton_step(Friction friction) noexcept {
     const Vector3d shift = step.head<3>(), turn = step.tail<3>();
     body.X_WQ.translation_m += shift;
     body.X_WQ.rotation = (body.X_WQ.rotation * rotation_from(turn)).normalized();
-    change_m = std::max(shift.norm() + body.radius_m * turn.norm(), change_m);
+    const double radius_m =
+        i == 0 && grasp_ ? body.radius_m + grasp_->X_TB.translation_m.norm() + bodies_[grasp_->body].radius_m
+                         : body.radius_m;
+    change_m = std::max(shift.norm() + radius_m * turn.norm(), change_m);
+    if (i == 0 && grasp_) move_held();
   }
   for (std::size_t k = 0; k < island_contacts_.size(); ++k) {
     BodyContact& contact = contacts_[island_contacts_[k]];
@@ -506,7 +563,7 @@ bool BodyWorld::sweep_pairs() noexcept {
     const auto changed = [&](std::size_t i) {
       return i != BodyContact::kFixed && !same_bits(bodies_[i].X_WQ, bodies_[i].X_WQ_swept);
     };
-    if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
+    if (!takes_part(pair->a()) || !takes_part(pair->b()) || joins(*pair)) continue;
     const bool moves = pair->is_fixed() && pair->scene().has_moving_obstacles();
     if (!moves && !changed(pair->a()) && !changed(pair->b())) continue;
     if (!sweep_pair(*pair)) free = false;
@@ -694,6 +751,9 @@ void BodyWorld::take_back() noexcept {
   }
   contacts_ = contacts_before_;  // equal capacities: no allocation
   time_s_ = time_before_s_;
+  grasp_ = grasp_before_;
+  return_ = return_before_;
+  tool_load_ = tool_load_before_;
 }
 
 /// A sweep from an admissible start that meets nothing ends at an admissible pose. The tool rests on it, and
@@ -734,10 +794,10 @@ void BodyWorld::apply_impulses() noexcept {
     c.point_W_m = at.point_W_m;
     c.normal_W = at.n_W;
     c.slip_m = slip_m(c, at).norm();
-    if (c.a == 0)
+    if (c.a == 0)  // the load of a held body counts as a whole, with what touches it
       work_on_tool_J_ += 0.5 * (c.last_force_W_N + c.force_W_N).dot(other_displacement_m(c, at.point_W_m));
     const auto push = [&](std::size_t i, double sign) {
-      if (i == BodyContact::kFixed || i == 0) return;
+      if (i == BodyContact::kFixed || moves_with_tool(i)) return;
       Body& body = bodies_[i];
       const Vector3d impulse = sign * body.step_s * c.force_W_N;
       body.free.velocity_W_m_per_s += impulse / body.M.mass_kg;
@@ -756,7 +816,7 @@ void BodyWorld::apply_impulses() noexcept {
 void BodyWorld::prefetch() noexcept {
   const auto still = [&](std::size_t i) { return i == BodyContact::kFixed || bodies_[i].asleep; };
   for (const auto& pair : pairs_) {
-    if (!takes_part(pair->a()) || !takes_part(pair->b())) continue;
+    if (!takes_part(pair->a()) || !takes_part(pair->b()) || joins(*pair)) continue;
     if (still(pair->a()) && still(pair->b()) && !pair->scene().has_moving_obstacles()) continue;
     const auto next = [&](std::size_t i) {
       if (i == BodyContact::kFixed) return BodyPath{};

@@ -12,6 +12,7 @@
 #include "collision/bodies/body_contact.hpp"
 #include "collision/bodies/body_pair.hpp"
 #include "collision/bodies/free_body.hpp"
+#include "collision/bodies/grasp.hpp"
 #include "collision/scene.hpp"
 #include "core/cone_projection.hpp"
 #include "core/free_motion.hpp"
@@ -45,6 +46,7 @@ class BodyWorld {
     /// Steps of ConeProjection after which a step looks for no more answers to Coulomb's law and takes
     /// convex ones.
     std::uint32_t solver_steps = 300;
+    GraspStrength grasp;
   };
   /// What the hand asks for: the pose that it commands and the stiffness k of the energy law.
   struct Hand {
@@ -61,7 +63,8 @@ class BodyWorld {
   /// allocates.
   BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Settings& settings);
 
-  /// Places a body. Its pose must be admissible. RT-safe.
+  /// Places a body. Its pose must be admissible. A grasp ends, unless its body still is where the tool holds
+  /// it. RT-safe.
   void place(std::size_t body, const BodyMotion& motion) noexcept;
 
   /// Moves all bodies for dt_s [s], and the obstacles that move to their poses at scene time until_s [s].
@@ -70,6 +73,12 @@ class BodyWorld {
   Status step(const std::optional<Hand>& hand, double dt_s) noexcept {
     return step(hand, dt_s, time_s_ + dt_s);
   }
+  /// Joins the tool to the body that it presses on most. Returns false if it touches no body, or holds one.
+  /// RT-safe.
+  bool grasp() noexcept;
+  /// Lets go of the body that the tool holds. The tool then returns to the hand's pose without a jump.
+  /// RT-safe.
+  void let_go() noexcept;
   /// Undoes the last step. The next step then is another attempt at the same one. RT-safe.
   void take_back() noexcept;
   /// Sets the scene time of the obstacle poses at the start of the next step. RT-safe.
@@ -85,6 +94,14 @@ class BodyWorld {
   const std::string& name(std::size_t body) const noexcept { return bodies_[body].name; }
   /// The contacts that touch after the last step, with their forces.
   std::span<const BodyContact> contacts() const noexcept { return contacts_; }
+  /// The body that the tool holds; 0 if it holds none.
+  std::size_t held_body() const noexcept { return grasp_ ? grasp_->body : 0; }
+  /// True if the last step ended a grasp whose load was larger than its strength.
+  bool grasp_broke() const noexcept { return grasp_broke_; }
+  /// What a held body, or the return after one, put on the tool in the last step.
+  const ToolLoad& tool_load() const noexcept { return tool_load_; }
+  /// The pose to which the last step pulled the tool: the hand's, or one on the way back to it.
+  Pose tool_goal() const noexcept;
   /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
   double time_s() const noexcept { return time_s_; }
   /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
@@ -136,6 +153,19 @@ class BodyWorld {
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
   bool newton_step(Friction friction) noexcept;
   Vector6d descent(std::size_t body) noexcept;
+  static Vector6d pull_gradient(const Body& body, const Pose& X_goal) noexcept;
+  static Matrix6d metric_of(const Body& body) noexcept;
+  void add_held(Vector6d& gradient, Matrix6d& metric) const noexcept;
+  void move_held() noexcept;
+  bool holds(std::size_t body) const noexcept { return grasp_ && body == grasp_->body; }
+  /// The body whose unknowns move a body: the tool for the one that it holds.
+  std::size_t mover_of(std::size_t body) const noexcept { return holds(body) ? 0 : body; }
+  bool moves_with_tool(std::size_t body) const noexcept { return body == 0 || holds(body); }
+  bool joins(const BodyPair& pair) const noexcept { return pair.a() == 0 && holds(pair.b()); }
+  ToolLoad load_of_held() const noexcept;
+  ToolLoad load_of_return() const noexcept;
+  void finish_grasp() noexcept;
+  void advance_return() noexcept;
   bool root_with_curvature(const Matrix6d& metric) noexcept;
   Vector6d gap_gradient(const BodyContact& contact, const Vector6d& step) const noexcept;
   FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
@@ -177,6 +207,10 @@ class BodyWorld {
   std::vector<BodyState> bodies_before_;      ///< before the last step
   std::vector<BodyContact> contacts_before_;  ///< before the last step
   double time_before_s_ = 0.0;
+  std::optional<Grasp> grasp_, grasp_before_;
+  std::optional<ToolReturn> return_, return_before_;  ///< of the tool after a grasp
+  ToolLoad tool_load_, tool_load_before_;
+  bool grasp_broke_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;
