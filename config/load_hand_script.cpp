@@ -25,6 +25,7 @@ void read_waypoint(TomlTable& table, HandScript& script) {
   const bool time_good = time.number(w.time_s, {0, 86400});
   table.mandatory("position_m").vector(w.position_m, {-10, 10});
   table.optional("rotation_vector_rad").vector(w.rotation_vector_rad, {-100, 100});
+  table.optional("grasp").boolean(w.grasp);
 
   if (time_good && script.path.empty() && w.time_s != 0.0) time.reject("the first waypoint is at time 0");
   if (time_good && !script.path.empty() && w.time_s < script.path.back().time_s + kMinStep_s) {

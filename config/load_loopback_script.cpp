@@ -79,6 +79,8 @@ void read_command(TomlTable& table, LoopbackScript& script) {
                                                        {"heartbeat", CommandSet{kHeartbeat}},
                                                        {"disarm", CommandSet{kDisarm}},
                                                        {"reinitialize", CommandSet{kReinitialize}},
+                                                       {"grasp", CommandSet{kGrasp}},
+                                                       {"let_go", CommandSet{kLetGo}},
                                                        {"stop", CommandSet{kStop}},
                                                        {"acknowledge", CommandSet{kAcknowledge}},
                                                        {"quit", CommandSet{kQuit}}});

@@ -160,10 +160,11 @@ void read_buttons(TomlTable& table, DeviceProfile& p) {
     TomlValue value;
     bool ends_force;
   };
-  const std::array<Meaning, 4> meanings = {
+  const std::array<Meaning, 5> meanings = {
       {{"deadman", &p.deadman_button, table.optional("deadman"), true},
        {"stop", &p.stop_button, table.optional("stop"), true},
        {"recentre", &p.recentre_button, table.optional("recentre"), false},
+       {"grasp", &p.grasp_button, table.optional("grasp"), false},
        {"slow", &p.slow_button, table.optional("slow"), false}}};
   for (std::size_t i = 0; i < meanings.size(); ++i) {
     const auto& [name, button, value, ends_force] = meanings[i];

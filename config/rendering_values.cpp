@@ -63,6 +63,8 @@ const std::array kValues = {
                    [](const Settings& s) -> Value { return s.rendering.friction.static_coefficient; }, used},
     RenderingValue{"rendering.friction.dynamic",
                    [](const Settings& s) -> Value { return s.rendering.friction.dynamic_coefficient; }, used},
+    RenderingValue{"rendering.grasp.force_N", [](const Settings& s) -> Value { return s.rendering.grasp.force_N; }, used},
+    RenderingValue{"rendering.grasp.torque_Nm", [](const Settings& s) -> Value { return s.rendering.grasp.torque_Nm; }, used},
     RenderingValue{"wrench.law",
                    [](const Settings& s) -> Value {
                      return std::string(s.wrench.law == SpringLaw::pid ? "pid" : "energy");

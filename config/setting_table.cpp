@@ -214,6 +214,8 @@ constexpr std::array kTable = {
                     value.number(out, kCoefficient)),
     WRENCHD_SETTING("rendering.friction", "dynamic", "", new_rendering, rendering.friction.dynamic_coefficient,
                     value.number(out, kCoefficient)),
+    WRENCHD_NUMBER("rendering.grasp", "force_N", new_rendering, rendering.grasp.force_N, 0.1, 200),
+    WRENCHD_NUMBER("rendering.grasp", "torque_Nm", new_rendering, rendering.grasp.torque_Nm, 0.01, 20),
     WRENCHD_SETTING("wrench", "law", "", new_rendering, wrench.law,
                     value.choice(out, {{"pid", SpringLaw::pid}, {"energy", SpringLaw::energy}})),
     WRENCHD_SETTING("wrench", "energy_stiffness_per_s2", "per_s2", new_rendering, wrench.energy_stiffness_per_s2,
@@ -327,11 +329,12 @@ struct Section {
   bool read_if_absent;  ///< for defaults that need a lookup
   void (*check)(const SectionValues& values, Settings& settings);
 };
-constexpr std::array<Section, 11> kSections = {{{"", true, nullptr},
+constexpr std::array<Section, 12> kSections = {{{"", true, nullptr},
                                                 {"device", true, nullptr},
                                                 {"servo", false, nullptr},
                                                 {"rendering", false, check_rendering},
                                                 {"rendering.friction", false, check_friction},
+                                                {"rendering.grasp", false, nullptr},
                                                 {"wrench", false, nullptr},
                                                 {"limits", false, nullptr},
                                                 {"simulation", true, nullptr},

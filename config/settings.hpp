@@ -8,6 +8,7 @@
 
 #include "core/contact_backend.hpp"
 #include "core/friction.hpp"
+#include "core/grasp_strength.hpp"
 #include "core/limits.hpp"
 #include "core/method.hpp"
 #include "core/pose.hpp"
@@ -36,6 +37,7 @@ struct RenderingSettings {
   int planes = 47;  ///< number of planes N_delta of Eq. (40), for method = "planar"
   ContactBackend contacts = ContactBackend::native;  ///< contact detection between meshes
   FrictionSettings friction;                         ///< friction, for method = "exact"
+  GraspStrength grasp;                               ///< for scenes with free bodies
 };
 
 /// Default gains of [wrench]. At 1 kHz with 1.4 ms of delay a wall is stable up to (b + B) / (T/2 + delay) =

@@ -21,6 +21,8 @@ enum Command : CommandSet {
   kReleasedExternally = 256,  ///< force was released outside of the servo loop; appears only in records
   /// the connection of the client that armed has closed: the loop disarms without waiting for the timeout
   kClientLost = 512,
+  kGrasp = 1024,  ///< the tool holds the free body that it touches, or the first one that it will touch
+  kLetGo = 2048,
 };
 
 }  // namespace wrenchd

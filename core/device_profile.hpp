@@ -309,6 +309,7 @@ struct DeviceProfile {
   // Button numbers in the reports by function. -1: the device has no such button.
   int deadman_button = -1;   ///< force is enabled only while this button is held
   int stop_button = -1;      ///< pressed: emergency stop
+  int grasp_button = -1;     ///< held: the tool holds the free body that it touches
   int recentre_button = -1;  ///< pressed: handle and tool return to their start pose
   int slow_button = -1;      ///< held: a puck in mode rate steers at reduced speed
 

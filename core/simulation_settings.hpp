@@ -14,6 +14,7 @@ struct Waypoint {
   double time_s = 0.0;
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+  bool grasp = false;  ///< the hand presses the grasp button from here to the next waypoint
 };
 
 /// A pose with its time.

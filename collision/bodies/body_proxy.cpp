@@ -13,10 +13,11 @@ namespace {
 /// Time that passes in the first step of a world [s].
 constexpr double kFirstStep_s = 1e-3;
 
-BodyWorld::Settings world_settings(const Scene& scene, double tool_friction) {
+BodyWorld::Settings world_settings(const Scene& scene, double tool_friction, const GraspStrength& grasp) {
   BodyWorld::Settings settings;
   settings.gravity_W_m_per_s2 = scene.gravity_W_m_per_s2();
   settings.tool_friction = tool_friction;
+  settings.grasp = grasp;
   return settings;
 }
 
@@ -26,8 +27,8 @@ std::array<double, 3> numbers(const Vector3d& v) noexcept {
 
 }  // namespace
 
-BodyProxy::BodyProxy(const Scene& scene, double tool_friction)
-    : world_(scene, scene.bodies(), world_settings(scene, tool_friction)),
+BodyProxy::BodyProxy(const Scene& scene, double tool_friction, const GraspStrength& grasp)
+    : world_(scene, scene.bodies(), world_settings(scene, tool_friction, grasp)),
       M_(scene.tool().solid.inertia),
       first_body_(static_cast<std::uint32_t>(scene.obstacle_count())) {
   for (const FreeBody& body : scene.bodies()) starts_.add(body.motion);
@@ -59,7 +60,13 @@ Penetration BodyProxy::follow(const Pose& X_WP, double stiffness_per_s2, double 
   dt_s_ = step_to(time_s);
   until_s_ = time_s;
   hand_ = {X_WP, stiffness_per_s2};
+  if (grasp_wanted_) world_.grasp();
   return answer(world_.step(hand_, dt_s_, until_s_));
+}
+
+void BodyProxy::set_grasp(bool wanted) noexcept {
+  grasp_wanted_ = wanted;
+  if (!wanted) world_.let_go();
 }
 
 Penetration BodyProxy::follow_again(const Pose& X_WP) noexcept {
@@ -68,7 +75,7 @@ Penetration BodyProxy::follow_again(const Pose& X_WP) noexcept {
   return answer(world_.step(hand_, dt_s_, until_s_));
 }
 
-/// METHOD (42): what the contacts leave of the pull of the hand.
+/// METHOD (42): what the contacts and a held body leave of the pull of the hand.
 Penetration BodyProxy::answer(BodyWorld::Status status) const noexcept {
   Penetration out;
   Projection& q = out.projection;
@@ -90,9 +97,13 @@ Penetration BodyProxy::answer(BodyWorld::Status status) const noexcept {
     force_N += c.force_W_N;
     torque_Nm += (c.point_W_m - q.X_WQ.translation_m).cross(c.force_W_N);
   }
+  const ToolLoad& load = world_.tool_load();
+  force_N += load.force_W_N;
+  torque_Nm += load.torque_W_Nm;
+  const bool is_free = out.contacts == 0 && load.force_W_N.isZero(0.0) && load.torque_W_Nm.isZero(0.0);
   const double rest_N = std::hypot(force_N.norm(), torque_Nm.norm() / gyration_m);
   q.status = status == BodyWorld::Status::budget_spent ? ProjectionStatus::budget_spent
-             : out.contacts == 0                       ? ProjectionStatus::free
+             : is_free                                 ? ProjectionStatus::free
                                                        : ProjectionStatus::converged;
   if (q.status == ProjectionStatus::free) {
     q.energy = 0.0;
@@ -101,7 +112,8 @@ Penetration BodyProxy::answer(BodyWorld::Status status) const noexcept {
   q.kkt_residual = pull_N > 0.0 ? rest_N / pull_N : 0.0;
   out.eps = log(inverse(hand_.X_WP) * q.X_WQ);
   out.spring_displacement = out.eps;
-  out.contacts = std::max<std::uint16_t>(out.contacts, 1);  // a tool that waits is held as well
+  out.contacts =
+      std::max<std::uint16_t>(out.contacts, 1);  // a tool that waits, or that carries, is held as well
   return out;
 }
 

@@ -26,7 +26,7 @@ class BodyProxy {
   static constexpr double kMaxStep_s = 5e-3;
 
   /// Copies what it needs of the scene. Not RT-safe: allocates.
-  BodyProxy(const Scene& scene, double tool_friction);
+  BodyProxy(const Scene& scene, double tool_friction, const GraspStrength& grasp = {});
 
   /// Moves the bodies to scene time time_s [s] while no proxy follows the hand.
   void move_without_tool(double time_s) noexcept;
@@ -35,6 +35,13 @@ class BodyProxy {
   bool enter(const Pose& X_WQ, const BodyPoses& then, double then_s) noexcept;
   /// Moves tool and bodies to scene time time_s [s]. stiffness_per_s2: k of the energy law.
   Penetration follow(const Pose& X_WP, double stiffness_per_s2, double time_s) noexcept;
+  /// wanted: the tool holds the body that it touches, or the first one that it will touch; otherwise it lets
+  /// go.
+  void set_grasp(bool wanted) noexcept;
+  /// The number of the body that the tool holds, from 1 in the order of the scene; 0: none.
+  std::size_t held_body() const noexcept { return world_.held_body(); }
+  /// True if the last follow() ended a grasp whose load was larger than its strength.
+  bool grasp_broke() const noexcept { return world_.grasp_broke(); }
   /// Repeats the last follow() for another pose of the hand.
   Penetration follow_again(const Pose& X_WP) noexcept;
 
@@ -61,6 +68,7 @@ class BodyProxy {
   StaticVector<BodyMotion, SceneSettings::kMaxBodies> starts_;
   std::optional<double> last_time_s_;  ///< scene time of the last step; empty before the first one
   BodyWorld::Hand hand_;               ///< of the last follow()
+  bool grasp_wanted_ = false;
   double dt_s_ = 0.0, until_s_ = 0.0;  ///< of the last follow()
 };
 

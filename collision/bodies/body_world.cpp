@@ -346,10 +346,13 @@ ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
 }
 
 /// The pose at which a contact acts on a body: half way for a free body, so that the contact does the work of
-/// its gap, METHOD (103); q for the tool and what it holds, whose wrench is the gradient at q.
+/// its gap, METHOD (103); q for the tool, whose wrench is the gradient at q.
 Pose BodyWorld::acting_pose(std::size_t body) const noexcept {
-  const Body& one = bodies_[body];
-  return moves_with_tool(body) ? one.X_WQ : between(one.motion.X_WB, one.X_WQ, 0.5);
+  return body == 0 ? bodies_[0].X_WQ : half_way(body);
+}
+
+Pose BodyWorld::half_way(std::size_t body) const noexcept {
+  return between(bodies_[body].motion.X_WB, bodies_[body].X_WQ, 0.5);
 }
 
 ContactGeometry BodyWorld::acting_geometry(const BodyContact& contact) const noexcept {
@@ -396,7 +399,7 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
   }
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
     const Body& body = bodies_[mover_of(i)];
-    const Pose X_WB = acting_pose(mover_of(i));
+    const Pose X_WB = holds(i) ? half_way(0) : acting_pose(i);
     block = body.block;
     FrictionCone::Block moved;
     moved << sign * Matrix3d::Identity(),
@@ -806,6 +809,7 @@ void BodyWorld::apply_impulses() noexcept {
     push(c.a, 1.0);
     push(c.b, -1.0);
   }
+  push_held();
   for (Body& body : bodies_) {
     body.free.X_WB = body.X_WQ;
     body.motion = body.free;

@@ -164,6 +164,7 @@ class BodyWorld {
   bool joins(const BodyPair& pair) const noexcept { return pair.a() == 0 && holds(pair.b()); }
   ToolLoad load_of_held() const noexcept;
   ToolLoad load_of_return() const noexcept;
+  void push_held() noexcept;
   void finish_grasp() noexcept;
   void advance_return() noexcept;
   bool root_with_curvature(const Matrix6d& metric) noexcept;
@@ -174,6 +175,7 @@ class BodyWorld {
   Vector3d slip_m(const BodyContact& contact, const ContactGeometry& at) const noexcept;
   ContactGeometry geometry(const BodyContact& contact) const noexcept;
   Pose acting_pose(std::size_t body) const noexcept;
+  Pose half_way(std::size_t body) const noexcept;
   ContactGeometry acting_geometry(const BodyContact& contact) const noexcept;
   bool admissible(std::size_t island) const noexcept;
   bool takes_part(std::size_t body) const noexcept;
@@ -209,7 +211,7 @@ class BodyWorld {
   double time_before_s_ = 0.0;
   std::optional<Grasp> grasp_, grasp_before_;
   std::optional<ToolReturn> return_, return_before_;  ///< of the tool after a grasp
-  ToolLoad tool_load_, tool_load_before_;
+  ToolLoad tool_load_, tool_load_before_, grasp_load_;
   bool grasp_broke_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;

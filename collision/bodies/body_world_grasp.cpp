@@ -58,7 +58,7 @@ void BodyWorld::add_held(Vector6d& gradient, Matrix6d& metric) const noexcept {
   const Body& held = bodies_[grasp_->body];
   const Pose& X_TB = grasp_->X_TB;
   Matrix6d J = Matrix6d::Identity();
-  J.topRightCorner<3, 3>() = -bodies_[0].X_WQ.rotation.toRotationMatrix() * hat(X_TB.translation_m);
+  J.topRightCorner<3, 3>() = -half_way(0).rotation.toRotationMatrix() * hat(X_TB.translation_m);
   J.bottomRightCorner<3, 3>() = X_TB.rotation.conjugate().toRotationMatrix();
   gradient += J.transpose() * pull_gradient(held, held.X_goal);
   metric += J.transpose() * metric_of(held) * J;
@@ -75,17 +75,19 @@ ToolLoad BodyWorld::load_of_held() const noexcept {
   const Body& held = bodies_[grasp_->body];
   if (held.step_s == 0.0) return {};
   const Vector6d gradient = pull_gradient(held, held.X_goal);
-  const Vector3d centre_W_m = held.X_WQ.translation_m, tool_W_m = bodies_[0].X_WQ.translation_m;
+  const Pose X_WT = half_way(0);
   ToolLoad load;
   load.force_W_N = -gradient.head<3>();
-  load.torque_W_Nm = -(held.X_WQ.rotation * Vector3d(gradient.tail<3>()));
-  load.torque_W_Nm += (centre_W_m - tool_W_m).cross(load.force_W_N);
+  Vector3d torque_W_Nm = (X_WT.rotation * grasp_->X_TB.translation_m).cross(load.force_W_N) -
+                         X_WT.rotation * (grasp_->X_TB.rotation * Vector3d(gradient.tail<3>()));
   for (const BodyContact& c : contacts_) {
     if (!holds(c.a) && (c.b == BodyContact::kFixed || !holds(c.b))) continue;
     const Vector3d force_W_N = holds(c.a) ? c.force_W_N : Vector3d(-c.force_W_N);
     load.force_W_N += force_W_N;
-    load.torque_W_Nm += (c.point_W_m - tool_W_m).cross(force_W_N);
+    torque_W_Nm += (c.point_W_m - X_WT.translation_m).cross(force_W_N);
   }
+  // From the axes of the tool half way to those at q.
+  load.torque_W_Nm = bodies_[0].X_WQ.rotation * (X_WT.rotation.conjugate() * torque_W_Nm);
   return load;
 }
 
@@ -96,12 +98,23 @@ ToolLoad BodyWorld::load_of_return() const noexcept {
   return {gradient.head<3>(), tool.X_WQ.rotation * Vector3d(gradient.tail<3>())};
 }
 
-/// After the impulses of the contacts: the velocity of the held body, the work on the tool, METHOD (111), and
-/// the strength of the grasp.
+/// The whole impulse on a held body, of its contacts and of the tool, is that of its gradient, as for a free
+/// body. Before the poses of this step become those of the last one.
+void BodyWorld::push_held() noexcept {
+  grasp_load_ = {};
+  if (!grasp_) return;
+  Body& held = bodies_[grasp_->body];
+  if (held.step_s == 0.0) return;
+  grasp_load_ = load_of_held();
+  const Vector6d impulse = held.step_s * pull_gradient(held, held.X_goal);
+  held.free.velocity_W_m_per_s += impulse.head<3>() / held.M.mass_kg;
+  held.free.spin_W += half_way(grasp_->body).rotation * Vector3d(impulse.tail<3>());
+}
+
+/// The work on the tool, METHOD (111), and the strength of the grasp.
 void BodyWorld::finish_grasp() noexcept {
   const ToolLoad before = tool_load_;
-  tool_load_ = {};
-  if (grasp_) tool_load_ = load_of_held();
+  tool_load_ = grasp_load_;
   if (return_) {
     const ToolLoad back = load_of_return();
     tool_load_.force_W_N += back.force_W_N;
@@ -114,16 +127,9 @@ void BodyWorld::finish_grasp() noexcept {
       0.5 * (before.torque_W_Nm + tool_load_.torque_W_Nm)
                 .dot(rotation_vector(end.rotation * start.rotation.conjugate()));
   if (!grasp_) return;
-  Body& held = bodies_[grasp_->body];
-  if (held.step_s == 0.0) return;
-  const Pose& held_start = bodies_before_[grasp_->body].motion.X_WB;
-  held.motion.velocity_W_m_per_s = (held.X_WQ.translation_m - held_start.translation_m) / held.step_s;
-  set_angular_velocity_W(held.M,
-                         rotation_vector(held.X_WQ.rotation * held_start.rotation.conjugate()) / held.step_s,
-                         held.motion);
   const double share = -std::expm1(-dt_s_ / Grasp::kLoadTime_s);
-  grasp_->load.force_W_N += share * (tool_load_.force_W_N - grasp_->load.force_W_N);
-  grasp_->load.torque_W_Nm += share * (tool_load_.torque_W_Nm - grasp_->load.torque_W_Nm);
+  grasp_->load.force_W_N += share * (grasp_load_.force_W_N - grasp_->load.force_W_N);
+  grasp_->load.torque_W_Nm += share * (grasp_load_.torque_W_Nm - grasp_->load.torque_W_Nm);
   grasp_broke_ = grasp_->load.force_W_N.norm() > settings_.grasp.force_N ||
                  grasp_->load.torque_W_Nm.norm() > settings_.grasp.torque_Nm;
   if (grasp_broke_) let_go();

@@ -3,15 +3,10 @@
 
 #include <cstddef>
 
+#include "core/grasp_strength.hpp"
 #include "core/pose.hpp"
 
 namespace wrenchd {
-
-/// The largest wrench that a grasp transmits, about the tool's centre of mass.
-struct GraspStrength {
-  double force_N = 20.0;
-  double torque_Nm = 2.0;
-};
 
 /// Force and torque about the tool's centre of mass, both in W.
 struct ToolLoad {

@@ -161,6 +161,14 @@ MethodResult acknowledge(const DaemonContext& context, const Caller& caller) {
   return Json{{"requested", "acknowledge"}};
 }
 
+MethodResult grasp(const DaemonContext& context) {
+  if (context.runtime.reconfigurator().present_scene()->settings.bodies.empty())
+    throw RpcError(RpcCode::rejected,
+                   "the scene has no free body to hold: give it a [[body]], or load another scene");
+  context.runtime.loop().requests().grasp();
+  return Json{{"requested", "grasp"}};
+}
+
 MethodResult list_devices() {
   const KnownProfiles known = known_profiles(SearchPath());
   const std::vector<UsbDevice> connected = list_usb_devices();
@@ -293,6 +301,22 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
                         context.runtime.loop().requests().reinitialize_proxy();
                         return MethodResult(Json{{"requested", "reinitialize_proxy"}});
                       }});
+  table.add(MethodRow{
+      "grasp",
+      Role::operator_,
+      {},
+      "The tool holds the free body that it touches, or the first one that it will touch, until 'let_go'. "
+      "Event 'grasp' reports it. A load larger than the strength of the grasp ends it.",
+      [context](const Json&, const Caller&) { return grasp(context); }});
+  table.add(MethodRow{
+      "let_go",
+      Role::operator_,
+      {},
+      "The tool lets go of the body that it holds. The force of its weight fades out within 150 ms.",
+      [context](const Json&, const Caller&) {
+        context.runtime.loop().requests().let_go();
+        return MethodResult(Json{{"requested", "let_go"}});
+      }});
 }
 
 }  // namespace

@@ -129,6 +129,23 @@ EventDescription describe_event(const Event::RenderingChanged& e) {
           {{"rendering_id", e.rendering_id}, {"crossfade_complete", true}}};
 }
 
+EventDescription describe_event(const Event::Grasped& e) {
+  return {"grasp",
+          EventLevel::info,
+          fmt::format("the tool holds body {}", e.body),
+          {{"body", e.body}, {"held", true}, {"broke", false}}};
+}
+
+EventDescription describe_event(const Event::LetGo& e) {
+  return {"grasp",
+          EventLevel::info,
+          e.broke ? fmt::format("the tool lost body {}: its load was larger than the strength of the grasp "
+                                "([rendering.grasp])",
+                                e.body)
+                  : fmt::format("the tool let go of body {}", e.body),
+          {{"body", e.body}, {"held", false}, {"broke", e.broke}}};
+}
+
 }  // namespace
 
 EventDescription describe(const Event& event) {

@@ -50,7 +50,7 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
 }  // namespace
 
 std::span<const EventRow> feed_events() {
-  static const std::array<EventRow, 11> rows = {{
+  static const std::array<EventRow, 12> rows = {{
       {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "A fault was raised. fault: name, message and cure; value: its measured size, or 0; recording: the "
@@ -62,6 +62,9 @@ std::span<const EventRow> feed_events() {
       {"stiffness",
        "The self-test, or another rendering, has changed the share of the configured stiffness that stays "
        "passive. scale: this share; null: the profile states no damping, so the stability bound is unknown."},
+      {"grasp",
+       "The tool holds a free body, or has let go of it. body: its number, from 1 in the order of the scene; "
+       "held; broke: its load was larger than the strength of the grasp."},
       {"arming_rejected", "A request to arm was rejected. state: the state that does not allow it."},
       {"proxy_initialization",
        "The search for a feasible pose of the tool, after each arming. outcome: searching, found "

@@ -58,9 +58,17 @@ struct Event {
   struct RenderingChanged {
     std::uint32_t rendering_id;  ///< Rendering that is active from now on.
   };
+  /// The tool holds a free body.
+  struct Grasped {
+    std::uint32_t body;  ///< Number of the body, from 1 in the order of the scene.
+  };
+  struct LetGo {
+    std::uint32_t body;
+    bool broke;  ///< True if the load was larger than the strength of the grasp.
+  };
   using Data = std::variant<StateChanged, FaultRaised, StiffnessScaled, StabilityBoundUnknown, ArmingRejected,
                             ProjectionInfeasible, ProxySearchStarted, ProxyFound, ProxySearchFailed, Released,
-                            CrossfadeStarted, RenderingChanged, Waits>;
+                            CrossfadeStarted, RenderingChanged, Waits, Grasped, LetGo>;
 
   TimePoint at{};  ///< Start of the tick in which it happened, on the monotonic clock.
   Data data;

@@ -144,9 +144,10 @@ static_assert(are_contiguous(kContactFields, sizeof(Touch), alignof(Touch)),
               "Touch has a field that is not in the table");
 
 /// Names of the bits of CommandSet, lowest bit first.
-constexpr std::array kCommandNames = {"arm",  "disarm", "reinitialize proxy", "stop",    "acknowledge",
-                                      "quit", "lease",  "heartbeat",          "release", "client lost"};
-static_assert(kCommandNames.size() == std::bit_width(unsigned{kClientLost}));
+constexpr std::array kCommandNames = {"arm",   "disarm", "reinitialize proxy", "stop",    "acknowledge",
+                                      "quit",  "lease",  "heartbeat",          "release", "client lost",
+                                      "grasp", "let go"};
+static_assert(kCommandNames.size() == std::bit_width(unsigned{kLetGo}));
 
 template <class Name>
 std::vector<std::string> names_of(std::size_t count, const Name& name_of) {

@@ -26,6 +26,7 @@ Renderer::Renderer(const Settings& settings, const DeviceProfile& profile,
     : events_(events),
       wrench_point_(profile.wrench_point),
       driven_(driven_dofs(profile)),
+      grasp_button_(button_bit(profile.grasp_button)),
       recentre_button_(button_bit(profile.recentre_button)),
       crossfade_(std::move(rendering), exchange),
       workspace_(settings.device.base_in_world.pose()),
@@ -42,6 +43,7 @@ std::uint32_t Renderer::apply(const Requests& requests, const Verdict& verdict, 
   if (verdict.invalidate_proxy) invalidate_proxy(t.now);
   handle_buttons(reading.sample.buttons, t.now);
   change_rendering(is_driving(verdict.state), t);
+  update_grasp(requests.commands);
   if (requests.workspace) change_workspace(*requests.workspace);
   if (requests.local_models) {
     ++change_count_;
@@ -89,12 +91,31 @@ void Renderer::change_workspace(const WorkspaceRequest& request) noexcept {
 /// steered, and no force can jump.
 void Renderer::handle_buttons(std::uint32_t buttons, TimePoint now) noexcept {
   const bool pressed = (buttons & ~buttons_ & recentre_button_) != 0;
+  if (((buttons ^ buttons_) & grasp_button_) != 0) grasp_wanted_ = (buttons & grasp_button_) != 0;
   buttons_ = buttons;
   if (!pressed) return;
   if (driven_ == kNoDof)
     recentre(now);
   else
     recentre_pending_ = contact_muted_ = true;
+}
+
+void Renderer::update_grasp(CommandSet commands) noexcept {
+  if ((commands & kGrasp) != 0) grasp_wanted_ = true;
+  if ((commands & kLetGo) != 0) grasp_wanted_ = false;
+  crossfade_.active().set_grasp(grasp_wanted_);
+  if (Rendering* next = crossfade_.next()) next->set_grasp(grasp_wanted_);
+}
+
+/// A grasp that broke is not taken again until it is asked for again.
+void Renderer::report_grasp(TimePoint now) noexcept {
+  const auto held = static_cast<std::uint32_t>(active().held_body());
+  if (held == held_body_) return;
+  const bool broke = active().grasp_broke();
+  if (broke) grasp_wanted_ = false;
+  if (held_body_ != 0) events_.emit(now, Event::LetGo{held_body_, broke});
+  if (held != 0) events_.emit(now, Event::Grasped{held});
+  held_body_ = held;
 }
 
 void Renderer::recentre(TimePoint now) noexcept {
@@ -106,6 +127,7 @@ void Renderer::recentre(TimePoint now) noexcept {
 /// The proxy is unknown: no contact, zero wrench. The rendering that is being faded in becomes active.
 void Renderer::invalidate_proxy(TimePoint now) noexcept {
   if (crossfade_.invalidate_proxy()) adopt_rendering(now);
+  grasp_wanted_ = false;
   demand_.F_contact = demand_.F_weight = Wrench{};
   demand_.undriven = kNoDof;
   demand_.proxy_invalidated = true;
@@ -150,6 +172,7 @@ ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdic
     invalidate_proxy(t.now);
     demand_.interrupted = true;
   }
+  report_grasp(t.now);
   // While the workspace scale glides, the share changes each tick; its end value is reported.
   if (stability_.scale().spring == scale_before) report_scale(t.now);
   return contact();

@@ -72,6 +72,8 @@ class Renderer {
   void change_workspace(const WorkspaceRequest& request) noexcept;
   void handle_buttons(std::uint32_t buttons, TimePoint now) noexcept;
   void recentre(TimePoint now) noexcept;
+  void update_grasp(CommandSet commands) noexcept;
+  void report_grasp(TimePoint now) noexcept;
   bool update_contact_gain(const TickTime& t) noexcept;
   bool compute_demand(const DeviceSample& sample, const RenderingCrossfade::FadeLimits& limits,
                       const TickTime& t) noexcept;
@@ -89,6 +91,7 @@ class Renderer {
   EventQueue& events_;
   WrenchPoint wrench_point_;
   DofMask driven_;
+  std::uint32_t grasp_button_;     ///< Bit of the button that holds a free body; 0 if there is none.
   std::uint32_t recentre_button_;  ///< Bit of the button that recentres the workspace; 0 if there is none.
 
   RenderingCrossfade crossfade_;
@@ -104,6 +107,8 @@ class Renderer {
   bool recentre_pending_ = false;     ///< The workspace is recentred when the contact gain has reached 0.
   std::uint32_t recentre_count_ = 0;  ///< Last WorkspaceRequest::recentre_count.
   std::uint32_t buttons_ = 0;         ///< Buttons in the previous tick.
+  bool grasp_wanted_ = false;         ///< The tool holds the body that it touches.
+  std::uint32_t held_body_ = 0;       ///< Body of the last event about a grasp; 0 if the tool let go.
   std::uint32_t change_count_ = 0;    ///< Changes made on request since the start.
   double reported_scale_ = 1.0;       ///< Share of the stiffness in the last event about it.
   double sample_time_s_ = 0.0;        ///< Device time of the last usable sample.

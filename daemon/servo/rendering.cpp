@@ -77,7 +77,8 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
                              settings.rendering.friction, Proxy::WorkLimit{}, settings.rendering.contacts}),
       law_(gains_) {
   require_support_for_bodies(*scene_, settings);
-  if (!scene_->bodies().empty()) bodies_.emplace(*scene_, settings.rendering.friction.dynamic_coefficient);
+  if (!scene_->bodies().empty())
+    bodies_.emplace(*scene_, settings.rendering.friction.dynamic_coefficient, settings.rendering.grasp);
   invalidate_proxy();
 }
 

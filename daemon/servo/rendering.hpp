@@ -74,6 +74,14 @@ class Rendering {
   BodyPoses X_WB() const noexcept { return bodies_ ? bodies_->poses() : BodyPoses{}; }
   /// Takes over the motions of the bodies from another rendering of the same bodies. RT-safe.
   void adopt_bodies(const Rendering& other) noexcept;
+  /// BodyProxy::set_grasp(); without effect in a scene without bodies. RT-safe.
+  void set_grasp(bool wanted) noexcept {
+    if (bodies_) bodies_->set_grasp(wanted);
+  }
+  /// Number of the body that the tool holds, from 1 in the order of the scene; 0: none. RT-safe.
+  std::size_t held_body() const noexcept { return bodies_ ? bodies_->held_body() : 0; }
+  /// True if the load of a held body was larger than the strength of the grasp in this tick. RT-safe.
+  bool grasp_broke() const noexcept { return bodies_ && bodies_->grasp_broke(); }
   /// Returns the contacts that hold the proxy, at most kMaxTouches. RT-safe.
   Touches contacts() const noexcept;
   const Wrench& F_T() const noexcept { return F_T_; }  ///< Body wrench in axes of T at its origin. RT-safe.

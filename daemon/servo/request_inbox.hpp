@@ -51,6 +51,10 @@ class RequestInbox {
   /// Invalidates the proxy, after a change of tool or scene. The contact wrench is zero until a feasible pose
   /// near the hand is found; then the soft start runs again. Arming does the same by itself.
   void reinitialize_proxy() noexcept { request(kReinitialize); }
+  /// The tool holds the free body that it touches, or the first one that it will touch.
+  void grasp() noexcept { request(kGrasp); }
+  /// The tool lets go of the body that it holds, and holds none that it touches from now on.
+  void let_go() noexcept { request(kLetGo); }
 
   /// Changes scale, clutch or centre of the workspace (daemon/servo/workspace.hpp) without a jump of the
   /// wrench.

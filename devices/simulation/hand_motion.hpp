@@ -39,6 +39,9 @@ class HandMotion {
   /// Returns the target of the last step; before the first step, the start of the path. RT-safe.
   const HandTarget& target() const noexcept { return target_; }
 
+  /// True while the hand presses the grasp button on its path. RT-safe.
+  bool grasps(Duration since_start) const noexcept { return path_.grasps(since_start); }
+
   /// True if the handle is exactly on the path, whatever the forces are. RT-safe.
   bool prescribed() const noexcept { return prescribed_; }
 

@@ -56,9 +56,10 @@ HandPath::HandPath(const std::vector<Waypoint>& waypoints, bool repeats) : repea
     const Duration start = from_seconds(waypoints[i].time_s);
     segments_.push_back({start, from_seconds(waypoints[i + 1].time_s) - start, from,
                          to.translation_m - from.translation_m,
-                         rotation_vector(to.rotation * from.rotation.conjugate())});
+                         rotation_vector(to.rotation * from.rotation.conjugate()), waypoints[i].grasp});
   }
   final_target_.X_BG = pose_of(waypoints.back());
+  final_grasp_ = waypoints.back().grasp;
   end_ = from_seconds(waypoints.back().time_s);
 }
 
@@ -73,14 +74,28 @@ HandTarget HandPath::at(Duration since_start) const noexcept {
   return target;
 }
 
-HandTarget HandPath::undisplaced(Duration since_start) const noexcept {
-  if (spline_) return spline_->at(since_start);
-  if (segments_.empty() || (!repeats_ && since_start >= end_)) return final_target_;
+bool HandPath::grasps(Duration since_start) const noexcept {
+  if (spline_) return false;
+  return ended(since_start) ? final_grasp_ : segment_at(since_start).grasp;
+}
+
+bool HandPath::ended(Duration since_start) const noexcept {
+  return segments_.empty() || (!repeats_ && since_start >= end_);
+}
+
+/// Precondition: the path has not ended.
+const HandPath::Segment& HandPath::segment_at(Duration since_start) const noexcept {
   const Duration t = std::max(since_start, Duration{0}) % end_;
   const auto next = std::upper_bound(segments_.begin(), segments_.end(), t,
                                      [](Duration time, const Segment& s) { return time < s.start; });
-  const Segment& segment = *std::prev(next);
+  return *std::prev(next);
+}
 
+HandTarget HandPath::undisplaced(Duration since_start) const noexcept {
+  if (spline_) return spline_->at(since_start);
+  if (ended(since_start)) return final_target_;
+  const Segment& segment = segment_at(since_start);
+  const Duration t = std::max(since_start, Duration{0}) % end_;
   const double u = seconds(t - segment.start) / seconds(segment.length);
   const double s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
   const double s_rate_Hz = 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds(segment.length);

@@ -32,12 +32,17 @@ class HandPath {
   /// Returns the target at a time after the start of the path. After the last waypoint the path repeats, or
   /// the hand stays at the last waypoint. RT-safe.
   HandTarget at(Duration since_start) const noexcept;
+  /// Returns true while the hand presses the grasp button. RT-safe.
+  bool grasps(Duration since_start) const noexcept;
 
   /// Displaces the path, in B [m]. RT-safe.
   void displace(const Vector3d& d_B_m) noexcept { displacement_B_m_ += d_B_m; }
 
  private:
+  struct Segment;
   HandTarget undisplaced(Duration since_start) const noexcept;
+  bool ended(Duration since_start) const noexcept;
+  const Segment& segment_at(Duration since_start) const noexcept;
 
   struct Segment {
     Duration start;
@@ -45,10 +50,12 @@ class HandPath {
     Pose X_BG;               ///< pose at the start
     Vector3d translation_m;  ///< translation from the start to the end, in B
     Vector3d rotation_rad;   ///< rotation vector from the start to the end, in B
+    bool grasp;
   };
 
   std::vector<Segment> segments_;  ///< one segment per pair of waypoints
   HandTarget final_target_;
+  bool final_grasp_ = false;
   Vector3d displacement_B_m_ = Vector3d::Zero();
   Duration end_{};
   bool repeats_;

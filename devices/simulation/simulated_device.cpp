@@ -60,6 +60,7 @@ const PoseReportLayout& checked_layout(const DeviceProfile& profile) {
 SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings)
     : pose_layout_(checked_layout(profile)),
       wrench_point_(profile.wrench_point),
+      grasp_button_(button_bit(profile.grasp_button)),
       X_BD_(profile.X_BD),
       X_HE_(inverse(profile.X_EH)),
       same_frames_(same_bits(profile.X_BD, {}) && same_bits(profile.X_EH, {})),
@@ -131,6 +132,7 @@ void SimulatedDevice::send_report(ReportSink& host) noexcept {
   using Kind = SimulatedFault::Kind;
   PoseReport report = firmware_.make_report(now_ - power_on_);
   if (!same_frames_) express_in_device_frames(report);
+  if (hand_.grasps(now_ - power_on_)) report.buttons |= grasp_button_;
   apply_report_faults(report);
   if (fault_active_during(Kind::bad_quaternion, now_, now_))
     report.X_BH.rotation.coeffs() *= kBadQuaternionLength;

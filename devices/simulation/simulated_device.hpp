@@ -61,6 +61,7 @@ class SimulatedDevice final : public DeviceInHand {
 
   PoseReportLayout pose_layout_;
   WrenchPoint wrench_point_;
+  std::uint32_t grasp_button_;
   Pose X_BD_, X_HE_;
   bool same_frames_;                   ///< true if D = B and E = H
   std::uint64_t substeps_per_sample_;  ///< substeps per encoder sample

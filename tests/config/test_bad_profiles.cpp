@@ -314,6 +314,8 @@ const std::vector<Bad> kTable = {
      "is the deadman button as well"},
     {kWhole, "[closed_loop]", "[buttons]\nstop = 3\nrecentre = 3\n[closed_loop]", "3\n[closed",
      "is the stop button as well"},
+    {kWhole, "[closed_loop]", "[buttons]\nstop = 3\ngrasp = 3\n[closed_loop]", "3\n[closed",
+     "is the stop button as well"},
     {kWhole, "[closed_loop]", "[buttons]\nslow = 3\n[closed_loop]", "3\n[closed",
      "a slow button requires [deflection]"},
     {kWhole, "buttons = { byte = 1, type = \"u32\" }\n[wrench_report]",

@@ -57,6 +57,7 @@ std::string printed(const Settings& s) {
       << ' ' << s.servo.cpu << ' ' << s.servo.late_limit_s << '\n'
       << int(s.rendering.method) << ' ' << s.rendering.planes << ' ' << int(s.rendering.contacts) << ' '
       << s.rendering.friction.static_coefficient << ' ' << s.rendering.friction.dynamic_coefficient << '\n'
+      << s.rendering.grasp.force_N << ' ' << s.rendering.grasp.torque_Nm << '\n'
       << static_cast<int>(s.wrench.law) << ' ' << s.wrench.energy_stiffness_per_s2 << '\n'
       << s.wrench.gains.stiffness << '\n'
       << s.wrench.gains.integral << '\n'

@@ -24,6 +24,7 @@ using namespace wrenchd::test;
 
 constexpr double kTick_s = 1e-3;
 constexpr double kMostGain_J_per_s = 1e-6;
+constexpr int kReturn_ticks = 200;  // after a grasp, the tool is back at the hand by then
 constexpr double kFloor_m = 0.3;  // side of the plate
 
 struct Options {
@@ -31,11 +32,12 @@ struct Options {
   std::uint64_t seed = 1;
   double seconds = 1.0;
   int overlap_ticks = 20;  ///< ticks between two tests of all pairs in exact arithmetic
+  bool grasps = false;     ///< the hand holds bodies and lets go of them
   bool verbose = false;
 };
 
 struct Totals {
-  long scenes = 0, ticks = 0, unfinished = 0, poses = 0, overlaps = 0, violations = 0;
+  long scenes = 0, grasps = 0, ticks = 0, unfinished = 0, poses = 0, overlaps = 0, violations = 0;
   double worst_gain_J_per_s = 0.0;
   std::vector<double> tick_us;
 };
@@ -110,6 +112,7 @@ class RandomScene {
       const double before_J = world_->energy_J();
       std::vector<Pose> X_WB_before;
       for (std::size_t i = 0; i < world_->body_count(); ++i) X_WB_before.push_back(world_->motion(i).X_WB);
+      if (options_.grasps && has_hand_) totals.grasps += change_grasp(tick);
       const double start_us = thread_time_us();
       const BodyWorld::Status status = world_->step(hand(), kTick_s);
       totals.tick_us.push_back(thread_time_us() - start_us);
@@ -148,9 +151,30 @@ class RandomScene {
     return BodyWorld::Hand{pose_, 3000.0};
   }
 
+  /// At random ticks, at least 0.2 s apart, in which the tool has returned to the hand. Returns the number of
+  /// new grasps.
+  long change_grasp(int tick) {
+    if (world_->grasp_broke()) next_change_ = tick + kReturn_ticks;
+    if (tick < next_change_) return 0;
+    const std::size_t held = world_->held_body();
+    if (held != 0) {
+      world_->let_go();
+    } else if (!world_->grasp()) {
+      return 0;
+    }
+    next_change_ = tick + kReturn_ticks + random_.integer(0, 300);
+    return held == 0 ? 1 : 0;
+  }
+
   /// Work of the tool on the bodies in the last step, with the forces at its end.
   double work_of_tool_J(const std::vector<Pose>& X_WB_before) const {
     double work_J = 0.0;
+    if (world_->held_body() != 0 || world_->grasp_broke()) {
+      const Pose &start = X_WB_before[0], &end = world_->motion(0).X_WB;
+      const ToolLoad& load = world_->tool_load();
+      work_J -= load.force_W_N.dot(end.translation_m - start.translation_m) +
+                load.torque_W_Nm.dot(rotation_vector(end.rotation * start.rotation.conjugate()));
+    }
     for (const BodyContact& c : world_->contacts()) {
       if (c.a != 0 || c.b == BodyContact::kFixed) continue;
       const Pose &start = X_WB_before[c.b], &end = world_->motion(c.b).X_WB;
@@ -187,6 +211,7 @@ class RandomScene {
   std::unique_ptr<BodyWorld> world_;
   Pose pose_, target_;
   double speed_m_per_s_ = 0.2;
+  int next_change_ = 0;
   std::vector<std::unique_ptr<ExactIntersection>> with_plate_;
   std::vector<Pair> pairs_;
 };
@@ -211,6 +236,7 @@ int main(int argc, char** argv) {
   app.add_option("--overlap-ticks", options.overlap_ticks, "ticks between two exact tests of all pairs")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
+  app.add_flag("--grasps", options.grasps, "the hand holds bodies that it touches, and lets go of them");
   app.add_flag("--verbose", options.verbose, "prints a line for each scene");
   CLI11_PARSE(app, argc, argv);
   Totals totals;
@@ -228,10 +254,11 @@ int main(int argc, char** argv) {
   }
   std::sort(totals.tick_us.begin(), totals.tick_us.end());
   std::printf(
-      "prove_bodies scenes %ld ticks %ld unfinished %ld poses %ld overlaps %ld worst_gain_uJ_per_s %.3g "
+      "prove_bodies scenes %ld grasps %ld ticks %ld unfinished %ld poses %ld overlaps %ld "
+      "worst_gain_uJ_per_s %.3g "
       "p50_us %.0f "
       "p99_us %.0f p999_us %.0f max_us %.0f violations %ld\n",
-      totals.scenes, totals.ticks, totals.unfinished, totals.poses, totals.overlaps,
+      totals.scenes, totals.grasps, totals.ticks, totals.unfinished, totals.poses, totals.overlaps,
       1e6 * totals.worst_gain_J_per_s, quantile(totals.tick_us, 0.5), quantile(totals.tick_us, 0.99),
       quantile(totals.tick_us, 0.999), totals.tick_us.back(), totals.violations);
   return totals.violations == 0 ? 0 : 1;

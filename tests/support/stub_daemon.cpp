@@ -228,6 +228,8 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   if (method == "stop") return request(kStop);
   if (method == "acknowledge") return request(kAcknowledge);
   if (method == "reinitialize_proxy") return request(kReinitialize);
+  if (method == "grasp") return request(kGrasp);
+  if (method == "let_go") return request(kLetGo);
   if (method == "hand.set") {
     const auto vector_of = [&params](const char* name) {
       return Vector3d(params[name][0], params[name][1], params[name][2]);

@@ -173,6 +173,9 @@ TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
 TEST_CASE("gallery: a box that is pushed over a table", "[gallery]") {
   check_scene("push_the_box");
 }
+TEST_CASE("gallery: a peg that is put into a loose part", "[gallery]") {
+  check_scene("place_the_peg");
+}
 
 TEST_CASE("a recording of a scene with generated meshes replays without other files", "[gallery][program]") {
   const TemporaryDirectory files;
@@ -191,8 +194,8 @@ TEST_CASE("a recording of a scene with generated meshes replays without other fi
 TEST_CASE("every gallery scene has a description, a repeating script, a viewpoint and a test", "[gallery]") {
   const std::vector<std::string> all = names();
   CHECK(all == std::vector<std::string>{"bolt_and_nut", "gear_pair", "hares", "key_in_lock",
-                                        "moving_obstacle", "paper_cube", "peg_in_hole", "push_the_box",
-                                        "staircase", "thin_plate"});
+                                        "moving_obstacle", "paper_cube", "peg_in_hole", "place_the_peg",
+                                        "push_the_box", "staircase", "thin_plate"});
   for (const std::string& name : all) {
     INFO(name);
     const RunConfig plan = gallery_config(name);

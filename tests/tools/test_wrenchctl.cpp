@@ -589,7 +589,8 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{},
        "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, conform, profile, "
        "doctor, "
-       "status, watch, arm, describe, record, disarm, stop, acknowledge, reload, set, scene, workspace, "
+       "status, watch, arm, describe, record, grasp, let-go, disarm, stop, acknowledge, reload, set, scene, "
+       "workspace, "
        "view, faults, mesh, import, gallery, "
        "new, paper, replay, export, plot, sweep) is required"},
       {{"dance"}, "not expected: dance"},

@@ -14,6 +14,7 @@ const MOMENTS_s = {
   moving_obstacle: 7.5,
   paper_cube: 5.0,
   peg_in_hole: 4.4,
+  place_the_peg: 5.5,
   push_the_box: 5.4,
   staircase: 3.9,
   thin_plate: 2.0,

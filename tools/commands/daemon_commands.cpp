@@ -27,6 +27,9 @@ class DaemonCommands final : public Subcommand {
       run_describe(options_);
     })->add_option("method", options_.method, "name of a method; without it, all methods");
     add_record(app);
+    add(app, "grasp", "Hold the free body that the tool touches, or the first one that it will touch",
+        [this] { run_request("grasp", options_); });
+    add(app, "let-go", "Let go of the body that the tool holds", [this] { run_request("let_go", options_); });
     for (const auto& [name, description] :
          {std::pair{"disarm", "Fade the force out, no matter which client armed"},
           std::pair{"stop", "Emergency stop; requires no lease"},

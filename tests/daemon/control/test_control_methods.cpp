@@ -125,7 +125,7 @@ TEST_CASE("observers may stop and read; arming requires the role operator", "[co
   for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
     CHECK(t.methods.methods().at(open).min_role == Role::observer);
   for (const char* closed : {"lease.acquire", "lease.release", "lease.heartbeat", "arm", "disarm",
-                             "acknowledge", "reinitialize_proxy"})
+                             "acknowledge", "reinitialize_proxy", "grasp", "let_go"})
     CHECK(t.methods.methods().at(closed).min_role == Role::operator_);
 }
 

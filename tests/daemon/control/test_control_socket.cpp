@@ -131,6 +131,8 @@ std::vector<Abuse> abuses() {
       forbidden("lease.heartbeat"),
       forbidden("acknowledge"),
       forbidden("reinitialize_proxy"),
+      forbidden("grasp"),
+      forbidden("let_go"),
       line_of("no such method", request("sudo"), RpcCode::method_not_found),
       line_of("a method with a path in it", request("../../stop"), RpcCode::method_not_found),
       line_of("a method of 60 kB", request(std::string(60000, 'm')), RpcCode::method_not_found),

@@ -61,6 +61,20 @@ TEST_CASE("without a goal the hand is exactly on its path", "[hand_motion]") {
   CHECK(equal);
 }
 
+TEST_CASE("the hand presses the grasp button from one waypoint to the next", "[hand_motion]") {
+  SimulationSettings s = circling_hand();
+  s.hand_path[1].grasp = true;
+  const HandMotion repeats(s);
+  CHECK_FALSE(repeats.grasps(499ms));
+  CHECK(repeats.grasps(500ms));
+  CHECK(repeats.grasps(999ms));
+  CHECK_FALSE(repeats.grasps(1s));
+  CHECK(repeats.grasps(1500ms));
+  s.hand_repeats = false;
+  s.hand_path[2].grasp = true;
+  CHECK(HandMotion(s).grasps(5s));  // the hand stays at the last waypoint
+}
+
 TEST_CASE("the hand reaches a goal without overshoot, stays there, and returns to its moving path",
           "[hand_motion]") {
   Hand hand;

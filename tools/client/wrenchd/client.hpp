@@ -72,6 +72,9 @@ class Client {
   void stop() { call("stop"); }  ///< emergency stop; requires no lease
   void acknowledge() { call("acknowledge"); }
   void reinitialize_proxy() { call("reinitialize_proxy"); }
+  /// The tool holds the free body that it touches, or the first one that it will touch.
+  void grasp() { call("grasp"); }
+  void let_go() { call("let_go"); }  ///< the force of the body's weight fades out within 150 ms
 
   /// Moves the hand of a simulated device to a pose in the device base: position [m], rotation vector [rad].
   /// Call it again before it expires; afterwards the hand returns to its path. Throws ClientError for a

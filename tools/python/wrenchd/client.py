@@ -106,6 +106,14 @@ class Client:
     def reinitialize_proxy(self):
         return self.call("reinitialize_proxy")
 
+    def grasp(self):
+        """Makes the tool hold the free body that it touches, or the first one that it will touch."""
+        return self.call("grasp")
+
+    def let_go(self):
+        """Makes the tool let go of the body that it holds. The force of its weight fades out within 150 ms."""
+        return self.call("let_go")
+
     def heartbeat(self):
         """Sends a heartbeat. A Lease sends its own."""
         self._send({"jsonrpc": "2.0", "method": "lease.heartbeat", "params": {}})
