@@ -242,6 +242,7 @@ TEST_CASE("a deadman or stop button may come in any report, as a bit, from a lis
   CHECK(delta.stop_button == 3);
   const DeviceProfile highest = load("inherits = \"loopback\"\nname = \"mine\"\n[buttons]\nstop = 7\n");
   CHECK(highest.stop_button == 7);
+  CHECK(highest.grasp_button == 6);
 }
 
 TEST_CASE("a million fuzzed reports are decoded or rejected, and every sample is finite", "[profiles]") {

@@ -25,7 +25,7 @@ using namespace wrenchd::test;
 constexpr double kTick_s = 1e-3;
 constexpr double kMostGain_J_per_s = 1e-6;
 constexpr int kReturn_ticks = 200;  // after a grasp, the tool is back at the hand by then
-constexpr double kFloor_m = 0.3;  // side of the plate
+constexpr double kFloor_m = 0.3;    // side of the plate
 
 struct Options {
   long scenes = 20;
