@@ -51,6 +51,8 @@ Outcome run(std::uint64_t seed, bool bodies) {
       if (random.integer(0, 400) == 0)
         rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
       if (random.integer(0, 40) == 0) rig.loop.requests().heartbeat();
+      if (bodies && random.integer(0, 60) == 0)
+        rig.loop.requests().request(random.integer(0, 1) == 0 ? kGrasp : kLetGo);
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
       if (rig.raised(Fault::device_lost)) {  // the daemon also opens a lost device again
@@ -100,7 +102,8 @@ int main(int argc, char** argv) {
   app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);
   app.add_option("--seed", seed);
   bool bodies = false;
-  app.add_flag("--bodies", bodies, "the hand presses a box that moves by itself on the table");
+  app.add_flag("--bodies", bodies,
+               "the hand presses a box that moves by itself on the table, holds it and lets go");
   CLI11_PARSE(app, argc, argv);
   std::uint64_t ticks = 0;
   long violations = 0;
