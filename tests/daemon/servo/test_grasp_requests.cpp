@@ -9,22 +9,22 @@
 #include "tests/support/gallery_run.hpp"
 #include "tests/support/shipped_config.hpp"
 
-// The tool holds a free body on request, or while a button is pressed, and says so by events.
+// The tool holds a free body on request, or while a button is pressed, and reports it by events.
 
 namespace wrenchd::test {
 namespace {
 
-struct Told {
+struct GraspEvent {
   std::uint32_t body;
   bool held, broke;
-  bool operator==(const Told&) const = default;
+  bool operator==(const GraspEvent&) const = default;
 };
 
 /// The scene place_the_peg. The hand goes to the peg and lifts it; a button that the script presses is
 /// removed.
 struct Peg {
   VirtualRuntime s;
-  std::vector<Told> told;
+  std::vector<GraspEvent> events;
 
   explicit Peg(double strength_N = 20.0) : s(config(strength_N)) {
     s.tick();
@@ -46,9 +46,9 @@ struct Peg {
       largest_change_N = std::max(largest_change_N, change_N.norm());
       for (Event event; s.runtime.loop().telemetry().events().pop(event);) {
         if (const auto* grasped = std::get_if<Event::Grasped>(&event.data))
-          told.push_back({grasped->body, true, false});
+          events.push_back({grasped->body, true, false});
         if (const auto* let_go = std::get_if<Event::LetGo>(&event.data))
-          told.push_back({let_go->body, false, let_go->broke});
+          events.push_back({let_go->body, false, let_go->broke});
       }
     }
   }
@@ -62,14 +62,14 @@ TEST_CASE("the tool holds the body that it touches when asked, and lets go witho
   peg.run_until(2.4);
   peg.requests().grasp();
   peg.run_until(4.6);
-  CHECK(peg.told == std::vector<Told>{{1, true, false}});
+  CHECK(peg.events == std::vector<GraspEvent>{{1, true, false}});
   CHECK(peg.peg_z_m() > 0.09);
   // The weight of 60 g pulls the hand down.
   CHECK(peg.s.last.F_out[2] == Approx(-0.06 * 9.81).epsilon(0.05));
   peg.largest_change_N = 0.0;
   peg.requests().let_go();
   peg.run_until(4.9);
-  CHECK(peg.told == std::vector<Told>{{1, true, false}, {1, false, false}});
+  CHECK(peg.events == std::vector<GraspEvent>{{1, true, false}, {1, false, false}});
   CHECK(peg.peg_z_m() < 0.09);
   CHECK(peg.largest_change_N < 0.02);
   CHECK(std::abs(peg.s.last.F_out[2]) < 0.01);
@@ -81,9 +81,9 @@ TEST_CASE("a grasp that was asked for in the air takes the first body that the t
   peg.run_until(1.0);
   peg.requests().grasp();
   peg.run_until(1.5);
-  CHECK(peg.told.empty());
+  CHECK(peg.events.empty());
   peg.run_until(4.6);
-  CHECK(peg.told == std::vector<Told>{{1, true, false}});
+  CHECK(peg.events == std::vector<GraspEvent>{{1, true, false}});
   CHECK(peg.peg_z_m() > 0.09);
 }
 
@@ -92,8 +92,8 @@ TEST_CASE("a grasp that broke is not taken again until it is asked for again", "
   peg.run_until(2.4);
   peg.requests().grasp();
   peg.run_until(9.8);  // the hand comes back to the height of the peg
-  CHECK(peg.told.size() == 2);
-  CHECK(peg.told.back() == Told{1, false, true});
+  CHECK(peg.events.size() == 2);
+  CHECK(peg.events.back() == GraspEvent{1, false, true});
   CHECK(peg.peg_z_m() < 0.04);
 }
 
