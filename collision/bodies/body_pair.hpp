@@ -14,6 +14,12 @@ struct BodyPath {
   Pose start, end;
 };
 
+/// The pose at a fraction of the straight path between two poses. RT-safe.
+inline Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
+  return {from.rotation.slerp(fraction, to.rotation),
+          from.translation_m + fraction * (to.translation_m - from.translation_m)};
+}
+
 /// A pair of bodies of a BodyWorld, or a body and all fixed obstacles, and the sweep between them. Body a is
 /// the tool of the sweep and body b its obstacle, so the sweep runs in the frame of b. core/METHOD.md,
 /// section 15.4.

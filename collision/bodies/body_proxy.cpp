@@ -82,13 +82,8 @@ Penetration BodyProxy::answer(BodyWorld::Status status) const noexcept {
   q.X_WQ = world_.motion(0).X_WB;
   q.iterations = static_cast<std::uint16_t>(world_.rounds());
   q.energy = energy(M_, hand_.X_WP, q.X_WQ);
-  // The force that the hand applies at q, and its torque about the centre of mass.
-  Quaterniond E = hand_.X_WP.rotation.conjugate() * q.X_WQ.rotation;
-  if (E.w() < 0.0) E.coeffs() = -E.coeffs();
-  const Vector3d v = E.vec(), Hv = M_.H_kg_m2 * v;
-  const double k = hand_.stiffness_per_s2;
-  Vector3d force_N = k * M_.mass_kg * (hand_.X_WP.translation_m - q.X_WQ.translation_m);
-  Vector3d torque_Nm = q.X_WQ.rotation * Vector3d(-2.0 * k * (E.w() * Hv - v.cross(Hv)));
+  const Wrench pull_W = world_.pull_to(hand_.X_WP);
+  Vector3d force_N = pull_W.force_N, torque_Nm = pull_W.torque_Nm;
   const double gyration_m = std::sqrt(M_.H_kg_m2.trace() / (3.0 * M_.mass_kg));
   const double pull_N = std::hypot(force_N.norm(), torque_Nm.norm() / gyration_m);
   for (const BodyContact& c : world_.contacts()) {
@@ -97,10 +92,10 @@ Penetration BodyProxy::answer(BodyWorld::Status status) const noexcept {
     force_N += c.force_W_N;
     torque_Nm += (c.point_W_m - q.X_WQ.translation_m).cross(c.force_W_N);
   }
-  const ToolLoad& load = world_.tool_load();
-  force_N += load.force_W_N;
-  torque_Nm += load.torque_W_Nm;
-  const bool is_free = out.contacts == 0 && load.force_W_N.isZero(0.0) && load.torque_W_Nm.isZero(0.0);
+  const Wrench& load_W = world_.tool_load_W();
+  force_N += load_W.force_N;
+  torque_Nm += load_W.torque_Nm;
+  const bool is_free = out.contacts == 0 && load_W.force_N.isZero(0.0) && load_W.torque_Nm.isZero(0.0);
   const double rest_N = std::hypot(force_N.norm(), torque_Nm.norm() / gyration_m);
   q.status = status == BodyWorld::Status::budget_spent ? ProjectionStatus::budget_spent
              : is_free                                 ? ProjectionStatus::free

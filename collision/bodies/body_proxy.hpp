@@ -68,7 +68,7 @@ class BodyProxy {
   StaticVector<BodyMotion, SceneSettings::kMaxBodies> starts_;
   std::optional<double> last_time_s_;  ///< scene time of the last step; empty before the first one
   BodyWorld::Hand hand_;               ///< of the last follow()
-  bool grasp_wanted_ = false;
+  bool grasp_wanted_ = false;          ///< the last set_grasp()
   double dt_s_ = 0.0, until_s_ = 0.0;  ///< of the last follow()
 };
 

@@ -58,12 +58,6 @@ double shorter(double fraction) noexcept {
   return fraction > kMinFraction ? kShorter * fraction : 0.0;
 }
 
-/// The pose at a fraction of the straight path between two poses.
-Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
-  return {from.rotation.slerp(fraction, to.rotation),
-          from.translation_m + fraction * (to.translation_m - from.translation_m)};
-}
-
 std::shared_ptr<const MeshBvh> bvh_of(const ToolBody& body) {
   return std::make_shared<const MeshBvh>(body.mesh, body.kind);
 }
@@ -168,7 +162,7 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
   time_before_s_ = time_s_;
   grasp_before_ = grasp_;
   return_before_ = return_;
-  tool_load_before_ = tool_load_;
+  tool_load_before_W_ = tool_load_W_;
   grasp_broke_ = false;
   budget_ = {settings_.node_visits};
   solver_steps_ = 0;
@@ -187,7 +181,7 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
     std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
     let_go();
     return_.reset();
-    tool_load_ = {};
+    tool_load_W_ = {};
   }
   advance_return();
   dropped_.clear();
@@ -756,7 +750,7 @@ void BodyWorld::take_back() noexcept {
   time_s_ = time_before_s_;
   grasp_ = grasp_before_;
   return_ = return_before_;
-  tool_load_ = tool_load_before_;
+  tool_load_W_ = tool_load_before_W_;
 }
 
 /// A sweep from an admissible start that meets nothing ends at an admissible pose. The tool rests on it, and
@@ -797,7 +791,7 @@ void BodyWorld::apply_impulses() noexcept {
     c.point_W_m = at.point_W_m;
     c.normal_W = at.n_W;
     c.slip_m = slip_m(c, at).norm();
-    if (c.a == 0)  // the load of a held body counts as a whole, with what touches it
+    if (c.a == 0)  // finish_grasp() adds the work of a held body
       work_on_tool_J_ += 0.5 * (c.last_force_W_N + c.force_W_N).dot(other_displacement_m(c, at.point_W_m));
     const auto push = [&](std::size_t i, double sign) {
       if (i == BodyContact::kFixed || moves_with_tool(i)) return;

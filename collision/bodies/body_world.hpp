@@ -46,7 +46,7 @@ class BodyWorld {
     /// Steps of ConeProjection after which a step looks for no more answers to Coulomb's law and takes
     /// convex ones.
     std::uint32_t solver_steps = 300;
-    GraspStrength grasp;
+    GraspStrength grasp;  ///< a larger load ends a grasp
   };
   /// What the hand asks for: the pose that it commands and the stiffness k of the energy law.
   struct Hand {
@@ -98,10 +98,12 @@ class BodyWorld {
   std::size_t held_body() const noexcept { return grasp_ ? grasp_->body : 0; }
   /// True if the last step ended a grasp whose load was larger than its strength.
   bool grasp_broke() const noexcept { return grasp_broke_; }
-  /// What a held body, or the return after one, put on the tool in the last step.
-  const ToolLoad& tool_load() const noexcept { return tool_load_; }
-  /// The pose to which the last step pulled the tool: the hand's, or one on the way back to it.
-  Pose tool_goal() const noexcept;
+  /// The wrench of a held body, or of the return after a grasp, on the tool in the last step, about the
+  /// tool's centre of mass, in axes of W.
+  const Wrench& tool_load_W() const noexcept { return tool_load_W_; }
+  /// The wrench with which a pose attracts the tool at the end of the last step: minus the gradient of the
+  /// energy law, about the tool's centre of mass, in axes of W. RT-safe.
+  Wrench pull_to(const Pose& X_goal) const noexcept;
   /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
   double time_s() const noexcept { return time_s_; }
   /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
@@ -162,8 +164,8 @@ class BodyWorld {
   std::size_t mover_of(std::size_t body) const noexcept { return holds(body) ? 0 : body; }
   bool moves_with_tool(std::size_t body) const noexcept { return body == 0 || holds(body); }
   bool joins(const BodyPair& pair) const noexcept { return pair.a() == 0 && holds(pair.b()); }
-  ToolLoad load_of_held() const noexcept;
-  ToolLoad load_of_return() const noexcept;
+  Wrench load_of_held() const noexcept;
+  Pose tool_goal() const noexcept;
   void push_held() noexcept;
   void finish_grasp() noexcept;
   void advance_return() noexcept;
@@ -210,8 +212,11 @@ class BodyWorld {
   std::vector<BodyContact> contacts_before_;  ///< before the last step
   double time_before_s_ = 0.0;
   std::optional<Grasp> grasp_, grasp_before_;
-  std::optional<ToolReturn> return_, return_before_;  ///< of the tool after a grasp
-  ToolLoad tool_load_, tool_load_before_, grasp_load_;
+  /// The way of the tool back to the hand after a grasp; empty if it is back. before: before the last step.
+  std::optional<ToolReturn> return_, return_before_;
+  /// Loads on the tool about its centre of mass, in axes of W: of the held body and of the return; before the
+  /// last step; of the held body alone.
+  Wrench tool_load_W_, tool_load_before_W_, grasp_load_W_;
   bool grasp_broke_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;

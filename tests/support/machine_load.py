@@ -38,13 +38,13 @@ class MachineLoad:
 
     def busy_text(self, since=0):
         """Returns "machine too busy to judge: ..." with the figures of the busiest ten seconds since this line, or None if the
-        machine gave the rate. May wait for the end of the present line."""
+        machine gave the rate or was not measured. May wait for the end of the present line."""
         lines = len(self.lines)
         while len(self.lines) == lines and self.process.poll() is None:
             time.sleep(0.01)
         seen = self.lines[since:]
-        if not seen:
-            return "machine too busy to judge: its load was not measured"
+        if not seen:  # the measurement has failed, which excuses no failure
+            return None
         windows = [seen[i:i + WINDOW] for i in range(max(1, len(seen) - WINDOW + 1))]
         busiest = max(windows, key=lambda window: sum(late for late, _ in window))
         late, instants = sum(late for late, _ in busiest), INSTANTS * len(busiest)

@@ -53,7 +53,7 @@ struct Peg {
     }
   }
   double peg_z_m() const { return s.last.X_WB[2]; }
-  double largest_change_N = 0.0;  ///< of the force in one tick
+  double largest_change_N = 0.0;  ///< Largest change of the force in one tick.
 };
 
 TEST_CASE("the tool holds the body that it touches when asked, and lets go without a jump",
