@@ -64,6 +64,14 @@ Penetration BodyProxy::follow(const Pose& X_WP, double stiffness_per_s2, double 
   return answer(world_.step(hand_, dt_s_, until_s_));
 }
 
+void BodyProxy::move_tool(const Pose& X_WP, const Pose& X_WQ, double stiffness_per_s2,
+                          double time_s) noexcept {
+  dt_s_ = step_to(time_s);
+  until_s_ = time_s;
+  hand_ = {X_WP, stiffness_per_s2};
+  world_.move_tool(X_WQ, time_s);
+}
+
 void BodyProxy::set_grasp(bool wanted) noexcept {
   grasp_wanted_ = wanted;
   if (!wanted) world_.let_go();

@@ -35,6 +35,13 @@ class BodyProxy {
   bool enter(const Pose& X_WQ, const BodyPoses& then, double then_s) noexcept;
   /// Moves tool and bodies to scene time time_s [s]. stiffness_per_s2: k of the energy law.
   Penetration follow(const Pose& X_WP, double stiffness_per_s2, double time_s) noexcept;
+  /// True if a proxy that knows the obstacles alone has the same answer as follow(): the bodies sleep, and
+  /// the tool cannot reach them.
+  bool bodies_are_out_of_reach(const Pose& X_WP) const noexcept {
+    return world_.bodies_are_out_of_reach(X_WP);
+  }
+  /// Instead of follow(), where bodies_are_out_of_reach(): that proxy moved the tool to X_WQ.
+  void move_tool(const Pose& X_WP, const Pose& X_WQ, double stiffness_per_s2, double time_s) noexcept;
   /// wanted: the tool holds the body that it touches, or the first one that it will touch; otherwise it lets
   /// go.
   void set_grasp(bool wanted) noexcept;
@@ -42,7 +49,7 @@ class BodyProxy {
   std::size_t held_body() const noexcept { return world_.held_body(); }
   /// True if the last follow() ended a grasp whose load was larger than its strength.
   bool grasp_broke() const noexcept { return world_.grasp_broke(); }
-  /// Repeats the last follow() for another pose of the hand.
+  /// Repeats the last follow() or move_tool() for another pose of the hand.
   Penetration follow_again(const Pose& X_WP) noexcept;
 
   /// Change of T of Eq. (8) that bodies and moving obstacles caused in the last follow() [kg m^2].

@@ -37,6 +37,8 @@ constexpr double kTouch = 1.1;
 constexpr double kBehind = 0.1;
 /// A gap below the clearance opens by at most this multiple of the clearance in a step.
 constexpr double kOpening = 0.01;
+/// What the ball of bodies_are_out_of_reach() is larger by [m]: more than a contact keeps open, and rounding.
+constexpr double kReachMargin_m = 1e-6;
 /// If a sweep finds an overlap but no contact, the contacts with a gap below this multiple of the clearance
 /// at the start are added.
 constexpr double kNear = 4.0;
@@ -109,6 +111,7 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
 }
 
 void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
+  tool_was_moved_ = false;
   bodies_[body].motion = motion;
   for (Body& one : bodies_) {
     one.asleep = false;
@@ -154,8 +157,39 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
   return clean && whole ? Status::converged : Status::budget_spent;
 }
 
-/// Sets the goals of all bodies and moves the contacts with the obstacles that move.
-void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
+/// core/METHOD.md, section 15.7: the tool stays in a ball about the hand's pose, because T falls on its way.
+bool BodyWorld::bodies_are_out_of_reach(const Pose& X_WP) const noexcept {
+  const Body& tool = bodies_[0];
+  if (grasp_ || return_ || tool.friction > 0.0) return false;
+  const double reach_m =
+      tool.radius_m + std::sqrt(energy(tool.M, X_WP, tool.motion.X_WB) / tool.M.mass_kg) + kReachMargin_m;
+  const auto is_far = [&](const Body& body) {
+    const double distance_m = (body.motion.X_WB.translation_m - X_WP.translation_m).norm();
+    return body.asleep && distance_m > reach_m + body.radius_m;
+  };
+  return std::all_of(bodies_.begin() + 1, bodies_.end(), is_far) &&
+         std::none_of(pairs_.begin(), pairs_.end(),
+                      [](const auto& pair) { return pair->scene().has_moving_obstacles(); });
+}
+
+void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
+  // Nothing but the tool changes between two calls: what save() kept of the rest is still true.
+  if (!tool_was_moved_) {
+    std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
+    tool_load_W_ = {};
+    save();
+  }
+  bodies_before_[0] = {bodies_[0].motion, false, 0};
+  time_before_s_ = time_s_;
+  bodies_[0].motion.X_WB = X_WT;
+  time_s_ = until_s;
+  grasp_broke_ = false;
+  work_on_tool_J_ = 0.0;
+  tool_was_moved_ = true;
+}
+
+/// Keeps what take_back() returns to.
+void BodyWorld::save() noexcept {
   bodies_before_.clear();
   for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
   contacts_before_ = contacts_;  // equal capacities: no allocation
@@ -163,6 +197,12 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
   grasp_before_ = grasp_;
   return_before_ = return_;
   tool_load_before_W_ = tool_load_W_;
+}
+
+/// Sets the goals of all bodies and moves the contacts with the obstacles that move.
+void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
+  save();
+  tool_was_moved_ = false;
   grasp_broke_ = false;
   budget_ = {settings_.node_visits};
   solver_steps_ = 0;
@@ -751,6 +791,7 @@ void BodyWorld::take_back() noexcept {
   grasp_ = grasp_before_;
   return_ = return_before_;
   tool_load_W_ = tool_load_before_W_;
+  tool_was_moved_ = false;
 }
 
 /// A sweep from an admissible start that meets nothing ends at an admissible pose. The tool rests on it, and

@@ -84,6 +84,13 @@ class BodyWorld {
   /// Sets the scene time of the obstacle poses at the start of the next step. RT-safe.
   void set_time(double time_s) noexcept { time_s_ = time_s; }
 
+  /// True if a step without the bodies has the same answer: they sleep, and the tool touches none of them on
+  /// the way to the hand's pose X_WP. False in a world where the tool has friction, or obstacles move.
+  /// RT-safe.
+  bool bodies_are_out_of_reach(const Pose& X_WP) const noexcept;
+  /// Instead of a step, where bodies_are_out_of_reach(): another proxy moved the tool to X_WT. RT-safe.
+  void move_tool(const Pose& X_WT, double until_s) noexcept;
+
   /// True if the tool may enter at X_WT. It was admissible there with the bodies at X_WB_then and the
   /// obstacles at then_s; nothing has moved into it since. RT-safe.
   bool admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s) noexcept;
@@ -145,6 +152,7 @@ class BodyWorld {
   enum class Friction : std::uint8_t { coulomb, frozen, none };
 
   void begin(const std::optional<Hand>& hand) noexcept;
+  void save() noexcept;
   void set_goal(Body& body) noexcept;
   double held_gap_m(const BodyContact& contact, double opening_m) const noexcept;
   void move_contacts(double from_s, double to_s) noexcept;
@@ -218,6 +226,7 @@ class BodyWorld {
   /// last step; of the held body alone.
   Wrench tool_load_W_, tool_load_before_W_, grasp_load_W_;
   bool grasp_broke_ = false;
+  bool tool_was_moved_ = false;       ///< the last step was a move_tool()
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;

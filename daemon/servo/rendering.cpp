@@ -60,6 +60,18 @@ class Checksum64 {
   std::uint64_t sum_ = 0xcbf29ce484222325U;
 };
 
+/// Among bodies the proxy follows the hand alone only if BodyProxy, whose clearance and friction count, says
+/// so.
+PenetrationDepth::Options proxy_options(const Scene& scene, const Settings& settings) {
+  const RenderingSettings& rendering = settings.rendering;
+  PenetrationDepth::Options options{rendering.method,   rendering.planes,   0.0,
+                                    rendering.friction, Proxy::WorkLimit{}, rendering.contacts};
+  if (scene.bodies().empty()) return options;
+  options.clearance_m = BodyWorld::kClearance_m;
+  options.friction = {};
+  return options;
+}
+
 }  // namespace
 
 Rendering::Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
@@ -73,8 +85,7 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
-      penetration_(*scene_, {settings.rendering.method, settings.rendering.planes, 0.0,
-                             settings.rendering.friction, Proxy::WorkLimit{}, settings.rendering.contacts}),
+      penetration_(*scene_, proxy_options(*scene_, settings)),
       law_(gains_) {
   require_support_for_bodies(*scene_, settings);
   if (!scene_->bodies().empty())
@@ -139,11 +150,28 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
 Penetration Rendering::follow_among_bodies(double scene_time_s) noexcept {
   const bool first = proxy_initialization_ != ProxyInitialization::complete;
   constexpr double kLeastStiffness_per_s2 = 1.0;  // a spring that is scaled to nothing still leads the tool
-  const Penetration depth = bodies_->follow(
-      X_WP_, std::max(spring_scale_ * energy_stiffness_per_s2_, kLeastStiffness_per_s2), scene_time_s);
-  obstacle_work_kg_m2_ = first ? 0.0 : bodies_->work_kg_m2();
+  const double stiffness_per_s2 = std::max(spring_scale_ * energy_stiffness_per_s2_, kLeastStiffness_per_s2);
   scene_time_s_ = scene_time_s;
+  if (!first && bodies_->bodies_are_out_of_reach(X_WP_)) {
+    if (!follows_alone_) penetration_.clear_history(scene_time_s);
+    follows_alone_ = true;
+    obstacle_work_kg_m2_ = 0.0;
+    const Penetration depth = penetration_.follow(X_WP_, X_WQ_, scene_time_s);
+    bodies_->move_tool(X_WP_, depth.projection.X_WQ, stiffness_per_s2, scene_time_s);
+    return depth;
+  }
+  follows_alone_ = false;
+  const Penetration depth = bodies_->follow(X_WP_, stiffness_per_s2, scene_time_s);
+  obstacle_work_kg_m2_ = first ? 0.0 : bodies_->work_kg_m2();
   return depth;
+}
+
+/// The tick once more, for another pose of the hand.
+void Rendering::follow_among_bodies_again() noexcept {
+  follows_alone_ = false;
+  depth_ = bodies_->follow_again(X_WP_);
+  obstacle_work_kg_m2_ = bodies_->work_kg_m2();
+  X_WQ_ = depth_.projection.X_WQ;
 }
 
 void Rendering::adopt_bodies(const Rendering& other) noexcept {
@@ -157,9 +185,7 @@ bool Rendering::move(const Pose& X_WH) noexcept {
   X_WP_ = X_WH * X_HT_;
   if (proxy_initialization_ != ProxyInitialization::complete) return true;
   if (bodies_) {
-    depth_ = bodies_->follow_again(X_WP_);
-    obstacle_work_kg_m2_ = bodies_->work_kg_m2();
-    X_WQ_ = depth_.projection.X_WQ;
+    follow_among_bodies_again();
     return true;
   }
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
@@ -172,12 +198,7 @@ bool Rendering::move(const Pose& X_WH) noexcept {
 void Rendering::undo_move() noexcept {
   X_WP_ = X_WP_before_;
   X_WQ_ = X_WQ_before_;
-  if (bodies_) {
-    depth_ = bodies_->follow_again(X_WP_);
-    obstacle_work_kg_m2_ = bodies_->work_kg_m2();
-    X_WQ_ = depth_.projection.X_WQ;
-    return;
-  }
+  if (bodies_) return follow_among_bodies_again();
   depth_ = depth_before_;
   penetration_.discard_contacts();
 }
@@ -261,7 +282,7 @@ void Rendering::set_stiffness_scale(const StiffnessScale& scale) noexcept {
 }
 
 Touches Rendering::contacts() const noexcept {
-  if (in_contact() && bodies_) return bodies_->touches();
+  if (in_contact() && bodies_ && !follows_alone_) return bodies_->touches();
   return in_contact() ? touches(depth_.projection, *scene_, penetration_.uses_mesh_features()) : Touches{};
 }
 

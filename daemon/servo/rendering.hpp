@@ -107,6 +107,7 @@ class Rendering {
  private:
   void initialize_proxy(TimePoint now, double scene_time_s) noexcept;
   Penetration follow_among_bodies(double scene_time_s) noexcept;
+  void follow_among_bodies_again() noexcept;
 
   // Constant after construction
   std::uint32_t id_;
@@ -120,8 +121,9 @@ class Rendering {
   StabilityAnalysis stability_;
 
   PenetrationDepth penetration_;
-  std::optional<BodyProxy>
-      bodies_;  ///< Follows the hand in a scene with bodies; penetration_ does otherwise.
+  /// Follows the hand in a scene with bodies, unless they sleep out of reach; penetration_ does otherwise.
+  std::optional<BodyProxy> bodies_;
+  bool follows_alone_ = false;  ///< penetration_ followed the hand in the last tick of a scene with bodies
   WrenchLaw law_;
   LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.
