@@ -238,7 +238,11 @@ bool ConeProjection::obeys_coulomb(double tolerance_m) const noexcept {
     if (!(cone.n.dot(displacement(cone, z_)) + cone.h_m > -tolerance_m)) return false;
     const double load = cone.n.dot(forces_[i]);
     const double most = (cone.mu + kOutside) * std::max(load, 0.0) + kNoLoad_N;
-    if (!(load >= -kNoLoad_N) || !((forces_[i] - load * cone.n).squaredNorm() <= most * most)) return false;
+    const Vector3d friction_N = forces_[i] - load * cone.n;
+    if (!(load >= -kNoLoad_N) || !(friction_N.squaredNorm() <= most * most)) return false;
+    // Newton's method also ends where friction drives the slip instead of braking it.
+    const Vector3d slip_m = slip(cone);
+    if (slip_m.norm() > kStick_m && friction_N.dot(slip_m) > kNoLoad_N * slip_m.norm()) return false;
   }
   return true;
 }

@@ -27,6 +27,8 @@ const std::vector<MeshKind>& mesh_kinds() {
       {"screw", "radius 5 mm, thread of pitch 3 mm along 30 mm, with a head"},
       {"screw_nut", "for the screw: 14 mm high, 0.1 mm of play"},
       {"hare", "an animal with ears and feet, 120 mm high"},
+      {"bowl", "radius 51 mm, 30 mm high, inside a part of a sphere of radius 60 mm"},
+      {"ratchet", "disc of radius 20 mm with eight saw teeth above; two of them fit face to face"},
   };
   return kinds;
 }

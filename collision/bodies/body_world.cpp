@@ -434,10 +434,10 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
     const Body& body = bodies_[mover_of(i)];
     const Pose X_WB = holds(i) ? half_way(0) : acting_pose(i);
+    const Vector3d arm_m = holds(i) ? arm_of_held(at.point_W_m) : Vector3d(at.point_W_m - X_WB.translation_m);
     block = body.block;
     FrictionCone::Block moved;
-    moved << sign * Matrix3d::Identity(),
-        -sign * hat(at.point_W_m - X_WB.translation_m) * X_WB.rotation.toRotationMatrix();
+    moved << sign * Matrix3d::Identity(), -sign * hat(arm_m) * X_WB.rotation.toRotationMatrix();
     // The upper triangle is inverted from the right, by blocks.
     const Matrix3d left = right_divided(moved.leftCols<3>(), body.root.topLeftCorner<3, 3>());
     D << left, right_divided(moved.rightCols<3>() - left * body.root.topRightCorner<3, 3>(),

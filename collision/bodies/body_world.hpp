@@ -172,6 +172,7 @@ class BodyWorld {
   std::size_t mover_of(std::size_t body) const noexcept { return holds(body) ? 0 : body; }
   bool moves_with_tool(std::size_t body) const noexcept { return body == 0 || holds(body); }
   bool joins(const BodyPair& pair) const noexcept { return pair.a() == 0 && holds(pair.b()); }
+  Vector3d arm_of_held(const Vector3d& point_W_m) const noexcept;
   Wrench load_of_held() const noexcept;
   Pose tool_goal() const noexcept;
   void push_held() noexcept;

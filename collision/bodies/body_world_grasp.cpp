@@ -69,6 +69,13 @@ void BodyWorld::move_held() noexcept {
   X_WQ.rotation.normalize();
 }
 
+/// From the tool's centre of mass to a point of the held body, in axes of W, half way between the poses of
+/// the tick. The centre of the held body moves along a chord: its middle is nearer to that of the tool than
+/// the body ever is, and the point belongs to the body there.
+Vector3d BodyWorld::arm_of_held(const Vector3d& point_W_m) const noexcept {
+  return half_way(0).rotation * grasp_->X_TB.translation_m + point_W_m - half_way(grasp_->body).translation_m;
+}
+
 /// METHOD (115): what the held body needs beyond its contacts comes from the tool.
 Wrench BodyWorld::load_of_held() const noexcept {
   const Body& held = bodies_[grasp_->body];
@@ -83,7 +90,7 @@ Wrench BodyWorld::load_of_held() const noexcept {
     if (!holds(c.a) && (c.b == BodyContact::kFixed || !holds(c.b))) continue;
     const Vector3d force_W_N = holds(c.a) ? c.force_W_N : Vector3d(-c.force_W_N);
     load_W.force_N += force_W_N;
-    torque_W_Nm += (c.point_W_m - X_WT.translation_m).cross(force_W_N);
+    torque_W_Nm += arm_of_held(c.point_W_m).cross(force_W_N);
   }
   // From the axes of the tool half way to those at q.
   load_W.torque_Nm = bodies_[0].X_WQ.rotation * (X_WT.rotation.conjugate() * torque_W_Nm);
@@ -118,8 +125,9 @@ void BodyWorld::finish_grasp() noexcept {
   const Wrench mean_W = 0.5 * (before_W + tool_load_W_);
   const Pose& start = bodies_before_[0].motion.X_WB;
   const Pose& end = bodies_[0].motion.X_WB;
+  const Quaterniond turn = (end.rotation * start.rotation.conjugate()).normalized();
   work_on_tool_J_ += mean_W.force_N.dot(end.translation_m - start.translation_m) +
-                     mean_W.torque_Nm.dot(rotation_vector(end.rotation * start.rotation.conjugate()));
+                     2.0 * std::copysign(1.0, turn.w()) * mean_W.torque_Nm.dot(turn.vec());
   if (!grasp_) return;
   const double share = -std::expm1(-dt_s_ / Grasp::kLoadTime_s);
   Wrench& load_W = grasp_->load_W;

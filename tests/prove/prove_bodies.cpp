@@ -171,9 +171,10 @@ class RandomScene {
     double work_J = 0.0;
     if (world_->held_body() != 0 || world_->grasp_broke()) {
       const Pose &start = X_WB_before[0], &end = world_->motion(0).X_WB;
+      const Quaterniond turn = (end.rotation * start.rotation.conjugate()).normalized();
       const Wrench& load_W = world_->tool_load_W();
       work_J -= load_W.force_N.dot(end.translation_m - start.translation_m) +
-                load_W.torque_Nm.dot(rotation_vector(end.rotation * start.rotation.conjugate()));
+                2.0 * std::copysign(1.0, turn.w()) * load_W.torque_Nm.dot(turn.vec());
     }
     for (const BodyContact& c : world_->contacts()) {
       if (c.a != 0 || c.b == BodyContact::kFixed) continue;
