@@ -301,6 +301,86 @@ TriangleMesh socket(const GeneratedMesh& request) {
   return lathe(even_angles(around_for(request, outside.size() + bore.size())), outside, bore);
 }
 
+/// Returns a bowl on a flat foot: z from 0 to 30 mm, inside a part of a sphere of radius 60 mm.
+TriangleMesh bowl(const GeneratedMesh& request) {
+  constexpr double kSphere_m = 0.060, kFloor_m = 0.003, kRim_m = 0.030;
+  const auto inner_m = [&](double z_m) {
+    const double above_m = z_m - kFloor_m;
+    return std::sqrt(above_m * (2.0 * kSphere_m - above_m));
+  };
+  // Rings at equal distances along the sphere, with nearly square cells.
+  const double angle = std::acos(1.0 - (kRim_m - kFloor_m) / kSphere_m);
+  const double cells = 0.5 * static_cast<double>(request.triangles);
+  const std::uint32_t down = at_least(std::sqrt(cells * angle / kFullTurn_rad), 3);
+  std::vector<Ring> rings = {circle(0.0, 0.030), circle(kRim_m, inner_m(kRim_m) + 0.003)};
+  for (std::uint32_t k = 0; k < down; ++k) {
+    const double at = angle * (1.0 - static_cast<double>(k) / down);
+    const double z_m = kFloor_m + kSphere_m * (1.0 - std::cos(at));
+    rings.push_back(circle(z_m, inner_m(z_m)));
+  }
+  return lathe(even_angles(around_for(request, rings.size())), rings, {});
+}
+
+/// Returns a disc with a bore and with saw teeth above: a ramp that rises with the angle, then a wall. Two of
+/// them fit face to face, z from 0 to 8 mm each, and turn against each other in one direction only.
+TriangleMesh ratchet(const GeneratedMesh& request) {
+  constexpr std::uint32_t kTeeth = 8;
+  constexpr double kBore_m = 0.006, kRadius_m = 0.020, kRoot_m = 0.0055, kTip_m = 0.008;
+  const std::uint32_t steps = at_least(static_cast<double>(request.triangles) / (8.0 * kTeeth), 1);
+  TriangleMesh mesh;
+  const auto vertex = [&](double radius_m, double angle, double z_m) {
+    mesh.vertices_m.emplace_back(radius_m * std::cos(angle), radius_m * std::sin(angle), z_m);
+    return static_cast<std::uint32_t>(mesh.vertices_m.size() - 1);
+  };
+  const auto quad = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  // The points of one angle: below, and on the ramp that ends there or begins there.
+  struct Spoke {
+    std::uint32_t low_in, low_out, in, out;
+  };
+  const auto spoke_at = [&](double angle, double z_m) {
+    return Spoke{vertex(kBore_m, angle, 0.0), vertex(kRadius_m, angle, 0.0), vertex(kBore_m, angle, z_m),
+                 vertex(kRadius_m, angle, z_m)};
+  };
+  const Spoke first = spoke_at(0.0, kRoot_m);
+  Spoke from = first;
+  for (std::uint32_t tooth = 0; tooth < kTeeth; ++tooth) {
+    for (std::uint32_t k = 1; k <= steps; ++k) {
+      const double along = static_cast<double>(k) / steps;
+      const double angle = kFullTurn_rad * (tooth + along) / kTeeth;
+      const bool closes = tooth + 1 == kTeeth && k == steps;
+      const double z_m = kRoot_m + (kTip_m - kRoot_m) * along;
+      Spoke to;
+      if (closes) {
+        to = {first.low_in, first.low_out, vertex(kBore_m, 0.0, z_m), vertex(kRadius_m, 0.0, z_m)};
+      } else {
+        to = spoke_at(angle, z_m);
+      }
+      quad(from.in, from.out, to.out, to.in);
+      quad(from.low_in, to.low_in, to.low_out, from.low_out);
+      if (k < steps) {
+        quad(from.low_out, to.low_out, to.out, from.out);
+        quad(from.low_in, from.in, to.in, to.low_in);
+        from = to;
+        continue;
+      }
+      // The wall down to the next ramp. Its root is a corner of the sides, too.
+      Spoke next = first;
+      if (!closes)
+        next = {to.low_in, to.low_out, vertex(kBore_m, angle, kRoot_m), vertex(kRadius_m, angle, kRoot_m)};
+      quad(from.low_out, to.low_out, next.out, from.out);
+      mesh.triangles.push_back({from.out, next.out, to.out});
+      quad(from.low_in, from.in, next.in, to.low_in);
+      mesh.triangles.push_back({from.in, to.in, next.in});
+      quad(to.in, to.out, next.out, next.in);
+      from = next;
+    }
+  }
+  return mesh;
+}
+
 /// The outline of a keyhole (a circle with a slot towards +x) or of a key's bit, as radius over angle.
 struct Keyhole {
   double radius_m, half_width_m, reach_m;
@@ -610,6 +690,8 @@ const std::vector<Maker>& makers() {
       {"screw", screw},
       {"screw_nut", screw_nut},
       {"hare", hare},
+      {"bowl", bowl},
+      {"ratchet", ratchet},
   };
   return all;
 }

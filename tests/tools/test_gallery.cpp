@@ -176,6 +176,21 @@ TEST_CASE("gallery: a box that is pushed over a table", "[gallery]") {
 TEST_CASE("gallery: a peg that is put into a loose part", "[gallery]") {
   check_scene("place_the_peg");
 }
+TEST_CASE("gallery: a stack that is knocked over", "[gallery]") {
+  check_scene("knock_the_stack");
+}
+TEST_CASE("gallery: dominoes", "[gallery]") {
+  check_scene("dominoes");
+}
+TEST_CASE("gallery: a ball in a bowl", "[gallery]") {
+  check_scene("ball_in_bowl");
+}
+TEST_CASE("gallery: a nut that is turned on a bolt", "[gallery]") {
+  check_scene("nut_on_bolt");
+}
+TEST_CASE("gallery: a ratchet", "[gallery]") {
+  check_scene("ratchet");
+}
 
 TEST_CASE("a recording of a scene with generated meshes replays without other files", "[gallery][program]") {
   const TemporaryDirectory files;
@@ -193,9 +208,10 @@ TEST_CASE("a recording of a scene with generated meshes replays without other fi
 
 TEST_CASE("every gallery scene has a description, a repeating script, a viewpoint and a test", "[gallery]") {
   const std::vector<std::string> all = names();
-  CHECK(all == std::vector<std::string>{"bolt_and_nut", "gear_pair", "hares", "key_in_lock",
-                                        "moving_obstacle", "paper_cube", "peg_in_hole", "place_the_peg",
-                                        "push_the_box", "staircase", "thin_plate"});
+  CHECK(all == std::vector<std::string>{"ball_in_bowl", "bolt_and_nut", "dominoes", "gear_pair", "hares",
+                                        "key_in_lock", "knock_the_stack", "moving_obstacle", "nut_on_bolt",
+                                        "paper_cube", "peg_in_hole", "place_the_peg", "push_the_box",
+                                        "ratchet", "staircase", "thin_plate"});
   for (const std::string& name : all) {
     INFO(name);
     const RunConfig plan = gallery_config(name);
@@ -223,13 +239,13 @@ TEST_CASE("wrenchctl gallery lists the scenes, and shows one", "[gallery][wrench
   CHECK_THAT(near.err, Catch::Contains("there is no 'stair_case'; did you mean 'staircase'?"));
   const ProgramResult none = run_program("wrenchctl", {"gallery", "teapot"});
   CHECK(none.exit_code == 1);
-  CHECK_THAT(none.err, Catch::Contains("there are bolt_and_nut, gear_pair"));
+  CHECK_THAT(none.err, Catch::Contains("there are ball_in_bowl, bolt_and_nut"));
 }
 
 TEST_CASE("tools/run rejects an unknown gallery name with the list of names", "[gallery]") {
   const ProgramResult result = run_program("../../../tools/run", {"teapot"});
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Catch::Contains("the gallery has no scene 'teapot'; the scenes are bolt_and_nut"));
+  CHECK_THAT(result.err, Catch::Contains("the gallery has no scene 'teapot'; the scenes are ball_in_bowl"));
 }
 
 }  // namespace

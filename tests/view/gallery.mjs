@@ -7,15 +7,20 @@ import { join } from "node:path";
 import { file, finished, open, sleep, source, test, until, view } from "./browser.mjs";
 
 const MOMENTS_s = {
+  ball_in_bowl: 4.1,
   bolt_and_nut: 5.4,
+  dominoes: 3.2,
   gear_pair: 4.0,
   hares: 9.9,
   key_in_lock: 3.7,
+  knock_the_stack: 3.3,
   moving_obstacle: 7.5,
+  nut_on_bolt: 6.0,
   paper_cube: 5.0,
   peg_in_hole: 4.4,
   place_the_peg: 5.5,
   push_the_box: 5.4,
+  ratchet: 5.5,
   staircase: 3.9,
   thin_plate: 2.0,
 };

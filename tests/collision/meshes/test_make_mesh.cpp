@@ -9,6 +9,7 @@
 #include "collision/meshes/make_mesh.hpp"
 #include "collision/meshes/mesh_check.hpp"
 #include "core/inertia.hpp"
+#include "tests/support/exact_intersection.hpp"
 
 namespace wrenchd {
 namespace {
@@ -44,7 +45,29 @@ TEST_CASE("generated meshes have the documented dimensions", "[make_mesh]") {
   CHECK(volume("dowel") ==
         Approx(3.14159265 * 1e-9 * (9.9 * 9.9 * 56 + 4.0 / 3.0 * (9.9 * 9.9 + 9.9 * 7.9 + 7.9 * 7.9)))
             .epsilon(1e-3));
+  CHECK(volume("ratchet") == Approx(3.14159265 * 1e-9 * (20 * 20 - 6 * 6) * 0.5 * (5.5 + 8)).epsilon(1e-3));
   CHECK(volume("hole") == Approx(3.14159265 * (0.02 * 0.02 - 0.01 * 0.01) * 0.08).epsilon(2e-3));
+}
+
+TEST_CASE("two ratchets fit face to face, and turn in one direction only", "[make_mesh]") {
+  const TriangleMesh disc = make_mesh({"ratchet", 400});
+  const test::ExactIntersection upper_in_lower(disc, disc);
+  const auto overlap = [&](double turned_rad, double lifted_m) {
+    const Quaterniond upside_down(0.0, 1.0, 0.0, 0.0);
+    const Quaterniond turn(Eigen::AngleAxisd(turned_rad, Vector3d::UnitZ()));
+    constexpr double kFitting_m = 0.0055 + 0.008;
+    return upper_in_lower.intersect({turn * upside_down, {0.0, 0.0, kFitting_m + lifted_m}});
+  };
+  constexpr double kTurn_rad = 0.02, kClearance_m = 1e-5;
+  constexpr double kRise_m = 0.0025 * kTurn_rad / (2.0 * 3.14159265 / 8.0);
+  CHECK_FALSE(overlap(1e-4, kClearance_m));
+  CHECK(overlap(0.0, -kClearance_m));
+  // Forth, it rises along the ramps.
+  CHECK(overlap(kTurn_rad, kRise_m - kClearance_m));
+  CHECK_FALSE(overlap(kTurn_rad, kRise_m + kClearance_m));
+  // Back, the walls meet.
+  CHECK(overlap(-kTurn_rad, kRise_m + kClearance_m));
+  CHECK_FALSE(overlap(-kTurn_rad, 0.0025 + kClearance_m));
 }
 
 TEST_CASE("a box has the requested sides", "[make_mesh]") {
