@@ -317,7 +317,7 @@ int main(int argc, char** argv) {
   if (quick) seconds = 1.0;
   const std::filesystem::path modules = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   std::vector<PeerBoxes> peers;
-  for (const char* name : {"mujoco_boxes", "bullet_boxes", "ode_boxes"}) {
+  for (const char* name : {"mujoco_boxes", "bullet_boxes", "ode_boxes", "siconos_boxes"}) {
     PeerBoxes peer;
     if (peer.load(modules / ("bench_peer_" + std::string(name) + ".so")))
       peers.push_back(peer);
