@@ -81,11 +81,35 @@ with h5py.File(sys.argv[1], "r+") as file:
   }
 
   // At the end: the curves and the histogram have the extremes of single ticks.
-  const most = await page.evaluate(() => Math.max(...window.view.history().values[3]));
+  await until("the curves of the end", () => page.evaluate((end) => Math.abs(window.view.history().time(window.view.history().rows - 1) - end) < 0.1, columns.end));
+  const most = await page.evaluate(() => window.view.history().extremes("force", -Infinity, Infinity)[1]);
   near(most, columns.most_force_N, 1e-9, "the greatest force of the curve");
   const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.tick_duration.max_us));
   near(longest, columns.longest_us, 1e-6, "the longest tick");
   assert.ok((await page.evaluate(() => window.view.world().triangles)) > 20);
+
+  // A drag in a plot zooms, a click goes to its time, and a double click returns. The cursor shows the values of all plots.
+  const box = await page.locator("#plot-force .u-over").boundingBox();
+  const at = (share) => [box.x + share * box.width, box.y + box.height / 2];
+  await page.mouse.move(...at(0.6));
+  assert.equal(await page.locator(".readout:visible").count(), 4);
+  assert.match(await page.locator("#plot-force .readout").textContent(), /norm [\d.]+.* N.*x .* N/);
+  await page.mouse.down();
+  await page.mouse.move(...at(0.7), { steps: 4 });
+  await page.mouse.up();
+  const [from, to] = await until("the zoom", () => page.evaluate(() => window.view.plots().held));
+  near(to - from, 1, 0.1, "the width of the zoom");
+  await page.keyboard.press("0");
+  assert.equal(await page.evaluate(() => window.view.plots().held), null);
+  await page.mouse.click(...at(0.5));
+  await until("the time of the click", async () => Math.abs(Number.parseFloat(await text(page, "play-time")) - (columns.end - 5)) < 0.1);
+  await page.mouse.dblclick(...at(0.8));
+  assert.equal(await page.evaluate(() => window.view.plots().held), null);
+
+  // The overview goes to a time of the whole recording.
+  const strip = await page.locator("#overview").boundingBox();
+  await page.mouse.click(strip.x + strip.width / 4, strip.y + strip.height / 2);
+  await until("a quarter of the recording", async () => Math.abs(Number.parseFloat(await text(page, "play-time")) - columns.end / 4) < 0.05);
 
   // Keys: to the beginning, a tick, a tenth of a second, play, pause.
   await page.keyboard.press("Home");
