@@ -31,7 +31,7 @@ const length3 = ([x, y, z]) => Math.hypot(x, y, z);
 
 test(async () => {
   const recording = file("run.h5");
-  await finished("wrenchd", ["--virtual-time", "--seconds", "8", "--arm", "--record", recording, "--control", "none"]);
+  await finished("wrenchd", ["--virtual-time", "--seconds", "12", "--arm", "--record", recording, "--control", "none"]);
   const script = file("columns.py");
   writeFileSync(script, COLUMNS);
   const numbers = [100, 2500, 3210, 4000, 5555, 6789, -1];
@@ -106,6 +106,11 @@ with h5py.File(sys.argv[1], "r+") as file:
   await page.mouse.dblclick(...at(0.8));
   assert.equal(await page.evaluate(() => window.view.plots().held), null);
 
+  // The text alternatives have the extremes of the shown curves.
+  const alternative = () => page.locator("#plot-force").getAttribute("aria-label");
+  const shownForce = await page.evaluate(() => window.view.history().extremes("force", ...window.view.plots().window)[1].toFixed(3));
+  await until("the text alternative of the end", async () => (await alternative()).includes(`norm 0.000 to ${shownForce} N`));
+
   // The overview goes to a time of the whole recording.
   const strip = await page.locator("#overview").boundingBox();
   await page.mouse.click(strip.x + strip.width / 4, strip.y + strip.height / 2);
@@ -114,6 +119,7 @@ with h5py.File(sys.argv[1], "r+") as file:
   // Keys: to the beginning, a tick, a tenth of a second, play, pause.
   await page.keyboard.press("Home");
   await until("the beginning", async () => (await text(page, "play-time")) === "0.000 s");
+  await until("a window that begins with the recording", () => page.evaluate(() => window.view.plots().window.join() === "0,10"));
   await page.keyboard.press("ArrowRight");
   await until("a tenth of a second", async () => (await text(page, "play-time")) === "0.100 s");
   await page.keyboard.press("Space");

@@ -71,7 +71,7 @@ TEST_CASE("columns keep their borders while the range moves", "[view]") {
 
 TEST_CASE("values outside of the range and gaps make no column", "[view]") {
   MinMaxColumns columns(100 * kMs, 200 * kMs, 11);
-  for (const std::int64_t ms : {50, 110, 111, 190, 250}) columns.add(bucket(ms * kMs, 1.0, 2.0));
+  for (const std::int64_t ms : {50, 111, 112, 190, 250}) columns.add(bucket(ms * kMs, 1.0, 2.0));
   CHECK(columns.columns().size() == 2);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   MinMaxColumns partly(0, 100 * kMs, 2);

@@ -274,7 +274,7 @@ const connection = new Connection({
     rate_Hz = hello.rate_Hz;
     Object.assign(player, { duration: hello.duration_s, changes: hello.changes, markers: hello.markers, requested: false,
       columnsRequested: false, columnsKey: "", compared: hello.compared });
-    plots.showRecording(hello.name, hello.compared?.name);
+    plots.showRecording(hello.name, hello.duration_s, hello.compared?.name);
     overview.setDuration(hello.duration_s);
     $("key-second").hidden = !hello.compared;
     if (hello.compared) set("key-second", `${hello.compared.name}${hello.compared.same_scene ? "" : " (another scene)"}`);

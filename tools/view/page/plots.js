@@ -9,6 +9,7 @@ const MINIMUM_WINDOW_s = 2e-3;
 const TIME_STEPS_s = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600];
 const LABEL_px = 62;  // width of a label of the time axis with its distance to the next one
 const DESCRIBE_INTERVAL_MS = 2000;
+const LEAST_DRAG_px = 4;  // a shorter one is a click
 
 export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -61,7 +62,7 @@ class Curve {
     this.plot = new uPlot({
       ...sizeOf(this.box),
       legend: { show: false },
-      cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, dist: 4 },
+      cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false, dist: LEAST_DRAG_px, click: () => {} },
         sync: { key: "plots", scales: ["x", null] }, bind: { dblclick: () => () => plots.release() } },
       padding: [6, scales.length > 1 ? 0 : 14, 0, 0],
       scales: {
@@ -84,6 +85,7 @@ class Curve {
     }, [[], ...series.map(() => [])], this.box);
     this.box.append(this.readout);
     this.box.setAttribute("role", "img");
+    this.plot.over.addEventListener("mousedown", (event) => (this.pressed_px = event.clientX));
     this.plot.over.addEventListener("click", (event) => this.click(event));
   }
 
@@ -104,7 +106,7 @@ class Curve {
   }
 
   click(event) {
-    if (this.zoomed) return (this.zoomed = false);  // the end of a drag
+    if (Math.abs(event.clientX - this.pressed_px) >= LEAST_DRAG_px) return;  // the end of a drag
     this.plots.pick(this.plot.posToVal(event.offsetX, "x"), event.detail > 1);
   }
 
@@ -113,8 +115,6 @@ class Curve {
     const [from, to] = [u.select.left, u.select.left + u.select.width].map((at) => u.posToVal(at, "x"));
     u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
     if (!u.cursor.event) return;  // a plot that only follows the cursor of another one
-    this.zoomed = true;
-    setTimeout(() => (this.zoomed = false));
     this.plots.hold(from, to);
   }
 
@@ -222,7 +222,9 @@ export class Plots {
     this.frozen = null;    // the history while live plots are paused
     this.recorded = [new Rows()];
     this.cursor = null;    // time under the cursor
+    this.describedAt = -Infinity;
     this.recording = false;
+    this.duration = 0;     // of the recording [s]
     const xyz = (name, factor, unit, minimum) => [
       { label: "norm", channel: name, factor, unit, colour: "norm", scale: "y", minimum },
       ...["x", "y", "z"].map((a) => ({ label: a, channel: `${name}_${a}`, factor, unit, colour: a, scale: "y", minimum }))];
@@ -257,7 +259,7 @@ export class Plots {
   /** Shows this range until release(). Live plots pause. */
   hold(from, to) {
     const width = Math.max(to - from, MINIMUM_WINDOW_s);
-    this.held = [from, from + width];
+    this.held = this.within(from, width);
     if (!this.recording) this.frozen ??= this.history.frozen();
     this.showControls();
     this.redraw();
@@ -306,12 +308,20 @@ export class Plots {
     this.seek(t);
   }
 
+  /** Returns a window. The window of a recording is moved and shortened so that it lies within the recording. */
+  within(from, width) {
+    if (!this.recording) return [from, from + width];
+    const length = Math.max(Math.min(width, this.duration), MINIMUM_WINDOW_s);
+    const start = Math.max(Math.min(from, this.duration - length), 0);
+    return [start, start + length];
+  }
+
   follow(now) {
     this.now = now;
-    if (!this.held) return (this.window = [now - this.span_s, now]);
+    if (!this.held) return (this.window = this.within(now - this.span_s, this.span_s));
     const width = this.held[1] - this.held[0];
-    if (this.recording && now > this.held[1]) this.held = [now - width, now];
-    if (this.recording && now < this.held[0]) this.held = [now, now + width];
+    if (this.recording && now > this.held[1]) this.held = this.within(now - width, width);
+    if (this.recording && now < this.held[0]) this.held = this.within(now, width);
     this.window = this.held;
   }
 
@@ -335,9 +345,10 @@ export class Plots {
 
   // --- data ---
 
-  /** recorded: the name of a recording; compared: the name of the second one, or undefined. */
-  showRecording(recorded, compared) {
+  /** recorded: the name of a recording of this duration [s]; compared: the name of the second one, or undefined. */
+  showRecording(recorded, duration, compared) {
     this.recording = true;
+    this.duration = duration;
     this.held = this.frozen = null;
     if (compared && this.recorded.length === 1) {
       this.recorded.push(new Rows());
@@ -350,6 +361,7 @@ export class Plots {
 
   setColumns(number, rows) {
     this.recorded[number] = rows;
+    this.describedAt = -Infinity;  // the text alternatives change with the curves
     this.redraw();
   }
 
@@ -372,7 +384,7 @@ export class Plots {
   redraw() {
     if (!this.held) this.follow(this.now);
     else this.window = this.held;
-    this.playhead = this.recording && this.held ? this.now : null;
+    this.playhead = this.recording && this.now < this.window[1] ? this.now : null;
     const data = this.data();
     for (const curve of this.curves) curve.draw(data, this.window);
     this.showReadout();
@@ -380,7 +392,7 @@ export class Plots {
   }
 
   describe() {
-    if (performance.now() < (this.describedAt ?? 0) + DESCRIBE_INTERVAL_MS) return;
+    if (performance.now() < this.describedAt + DESCRIBE_INTERVAL_MS) return;
     this.describedAt = performance.now();
     const [from, to] = this.window, data = this.data();
     const when = `${this.timeText(from, 0.1)} to ${this.timeText(to, 0.1)}`;
