@@ -128,4 +128,28 @@ with h5py.File(sys.argv[1], "r+") as file:
   await page.keyboard.press("Space");
   assert.equal(await text(page, "play"), "Play");
   assert.deepEqual(page.complaints(), []);
+  await page.close();
+  await compared(recording);
 });
+
+/** A second, shorter recording: its curves and its tool are shown while it lasts. */
+async function compared(recording) {
+  const other = file("other.h5");
+  await finished("wrenchd", ["--virtual-time", "--seconds", "6", "--arm", "--record", other, "--control", "none"]);
+  const { url } = await view([recording, "--compare", other]);
+  const page = await open(url);
+  await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
+  assert.match(await text(page, "compared"), /^solid: run\.h5; dashed: other\.h5$/);
+  assert.equal(await text(page, "key-second"), "other.h5");
+  await page.locator("#scrub").focus();
+  await page.keyboard.press("End");
+  await until("the end without the second tool", () => page.evaluate(() => window.view.frame().t > 11 && !window.view.world().second));
+  for (let i = 0; i < 8; ++i) await page.keyboard.press("Shift+ArrowLeft");
+  await until("both tools", () => page.evaluate(() => window.view.frame().t < 5 && window.view.world().tool && window.view.world().second));
+  await until("the curves of both", () => page.evaluate(() => window.view.plots().data().length === 2 &&
+    window.view.plots().data().every((rows) => rows.extremes("force", 3, 5)?.[1] > 0.1)));
+  const lines = await page.evaluate(() => window.view.plots().curves[0].plot.series.map(({ dash }) => Boolean(dash)));
+  assert.deepEqual(lines, [false, false, false, false, false, true, true, true, true]);
+  assert.match(await page.locator("#plot-force").getAttribute("aria-label"), /; compared, norm [\d.]+/);
+  assert.deepEqual(page.complaints(), []);
+}
