@@ -58,7 +58,18 @@ test(async () => {
   await page.keyboard.press("p");
   assert.equal(await page.getByRole("button", { name: "Resume plots", exact: true }).getAttribute("aria-pressed"), "true");
   assert.ok(await page.getByRole("button", { name: "Unzoom", exact: true }).isEnabled());
+  const plotted = () => page.evaluate(() => window.view.plots().window);
+  const paused = await plotted(), tick = Number.parseInt(await text(page, "tick"), 10);
+  await until("the daemon goes on while the plots rest", async () => Number.parseInt(await text(page, "tick"), 10) > tick + 200);
+  assert.deepEqual(await plotted(), paused);
   await page.keyboard.press("0");
+  for (const [name, span_s] of [["1 min", 60], ["10 min", 600], ["10 s", 10]]) {
+    await page.locator("#span").selectOption(name);
+    await until(`${name} until now`, async () => {
+      const [from, to] = await plotted();
+      return Math.abs(to - from - span_s) < 1e-6 && to > paused[1];
+    });
+  }
   assert.ok(await page.getByRole("button", { name: "Pause plots", exact: true }).isVisible());
 
   // Each plot has a text alternative with its values.

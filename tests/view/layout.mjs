@@ -44,6 +44,15 @@ function defects({ groups, scrolled }) {
   return found;
 }
 
+/** Returns the arrows that begin well inside the picture and end outside of it, and the number of arrows that begin there. Runs
+ * in the page. */
+function arrowsOutside() {
+  const { left, right, top, bottom } = document.getElementById("canvas").getBoundingClientRect();
+  const inside = ([x, y], margin = -1) => x >= left + margin && x <= right - margin && y >= top + margin && y <= bottom - margin;
+  const arrows = window.view.arrows().filter(([from]) => inside(from, (right - left) / 10));
+  return { count: arrows.length, outside: arrows.filter(([, to]) => !inside(to)).map(([, to]) => to.join()) };
+}
+
 test(async () => {
   const found = [];
   for (const name of names) {
@@ -58,9 +67,17 @@ test(async () => {
         const violations = await page.evaluate(async () => (await axe.run()).violations.map(({ id, help, nodes }) =>
           `${id}: ${help}: ${nodes.map(({ target }) => target.join(" ")).join("; ")}`));
         const layout = await page.evaluate(defects, { groups: GROUPS, scrolled: SCROLLED });
+        const { count, outside } = await page.evaluate(arrowsOutside);
+        if (count === 0 || outside.length > 0) layout.push(`of ${count} arrows end outside of the picture: ${outside.join("; ")}`);
         found.push(...[...layout, ...violations].map((text) => `${what}: ${text}`));
       }
     }
+    // Close to the tool the arrows are longer than the picture.
+    await page.mouse.move(...await page.evaluate(() => window.view.toolOnScreen()));
+    for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -400);
+    await sleep(1200);
+    const { outside } = await page.evaluate(arrowsOutside);
+    found.push(...outside.map((at) => `${name}, close: an arrow ends at ${at}`));
     assert.deepEqual(page.complaints(), []);
     await page.close();
     server.child.kill("SIGTERM");
