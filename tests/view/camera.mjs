@@ -60,7 +60,7 @@ test(async () => {
     return right[0] - left[0];
   }, scale.length_m);
   assert.ok(Math.abs(line.width - apart) < 2 && line.width > 30 && line.width < 120, `${line.width} px, ${apart} px`);
-  assert.match(await page.locator("#scale-text").textContent(), /^[\d.]+ (m|mm|um); force arrow [\d.]+ N$/);
+  assert.match(await page.locator("#scale-text").textContent(), /^[\d.]+ (m|mm|um); force arrows [\d.]+ N$/);
 
   // The camera follows the tool of a hand that moves, at a constant distance.
   await page.keyboard.press("l");

@@ -4,26 +4,9 @@
 import assert from "node:assert/strict";
 import { existsSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { file, finished, open, sleep, source, test, until, view } from "./browser.mjs";
+import { sleep, source, test } from "./browser.mjs";
+import { MOMENTS_s, shown } from "./gallery_scene.mjs";
 
-const MOMENTS_s = {
-  ball_in_bowl: 4.1,
-  bolt_and_nut: 5.4,
-  dominoes: 3.2,
-  gear_pair: 4.0,
-  hares: 9.9,
-  key_in_lock: 3.7,
-  knock_the_stack: 3.3,
-  moving_obstacle: 7.5,
-  nut_on_bolt: 6.0,
-  paper_cube: 5.0,
-  peg_in_hole: 4.4,
-  place_the_peg: 5.5,
-  push_the_box: 5.4,
-  ratchet: 5.5,
-  staircase: 3.9,
-  thin_plate: 2.0,
-};
 const README = "peg_in_hole";
 const SIZE = { width: 1280, height: 720 };
 // Compares means of blocks: they do not depend on the rasteriser's edges, but a missing or moved body changes them.
@@ -60,33 +43,11 @@ async function differing(page, pictures) {
   }, { pictures: pictures.map((one) => one.toString("base64")), block: BLOCK_px, least: LEAST_CHANGE });
 }
 
-async function shown(name, t_s) {
-  const recording = file(`${name}.h5`);
-  await finished("wrenchd", ["--config", `gallery/${name}.toml`, "--virtual-time", "--seconds", String(t_s + 0.05), "--arm",
-    "--record", recording, "--control", "none"]);
-  const server = await view([recording]);
-  const page = await open(server.url, { viewport: SIZE, colorScheme: "light" });
-  await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
-  await page.evaluate((t) => {
-    const slider = document.getElementById("scrub");
-    slider.step = "any";
-    slider.value = t;
-    slider.dispatchEvent(new Event("input"));
-  }, t_s);
-  await until(`${t_s} s is shown`, () => page.evaluate((t) => Math.abs(window.view.frame().t - t) < 0.002, t_s));
-  const drawn = () => page.evaluate(() => window.view.world().drawn);
-  for (let before = -1, now = await drawn(); now !== before; now = await drawn()) {
-    before = now;
-    await sleep(700);
-  }
-  return { page, server };
-}
-
 test(async () => {
   const all = readdirSync(join(source, "config/gallery")).map((one) => one.replace(/\.toml$/, "")).sort();
   assert.deepEqual(all, Object.keys(MOMENTS_s));
   for (const name of names.length > 0 ? names : all) {
-    const { page, server } = await shown(name, MOMENTS_s[name]);
+    const { page, server } = await shown(name, SIZE);
     const picture = await page.screenshot({ clip: await page.locator("#canvas").boundingBox() });
     if (renew) {
       writeFileSync(pictureOf(name), picture);

@@ -44,6 +44,42 @@ test(async () => {
   for (const id of ["arm", "stop", "fit", "theme", "help", "canvas"]) assert.ok(visited.includes(id), `${id} of ${visited}`);
   assert.ok(visited.indexOf("arm") < visited.indexOf("stop") && visited.indexOf("stop") < visited.indexOf("canvas"));
 
+  // The controls of the plots have names and are reached by Tab; the time cursor reads the values to a screen reader.
+  await page.locator("#follow").focus();
+  const controls = [["span", "combobox", "Span"], ["pause", "button", "Pause plots"], ["fit-values", "button", "Fit values"],
+    ["plot-cursor", "slider", "Time cursor of the plots"]];
+  for (const [id, role, name] of controls) {
+    await page.keyboard.press("Tab");
+    assert.equal(await page.evaluate(() => document.activeElement.id), id);
+    assert.equal(await page.getByRole(role, { name, exact: true }).getAttribute("id"), id);
+  }
+  await page.keyboard.press("ArrowLeft");
+  await until("the values at the cursor", async () => /norm [\d.]+.* N/.test(await page.locator("#plot-cursor").getAttribute("aria-valuetext")));
+  await page.keyboard.press("p");
+  assert.equal(await page.getByRole("button", { name: "Resume plots", exact: true }).getAttribute("aria-pressed"), "true");
+  assert.ok(await page.getByRole("button", { name: "Unzoom", exact: true }).isEnabled());
+  const plotted = () => page.evaluate(() => window.view.plots().window);
+  const paused = await plotted(), tick = Number.parseInt(await text(page, "tick"), 10);
+  await until("the daemon goes on while the plots rest", async () => Number.parseInt(await text(page, "tick"), 10) > tick + 200);
+  assert.deepEqual(await plotted(), paused);
+  await page.keyboard.press("0");
+  for (const [name, span_s] of [["1 min", 60], ["10 min", 600], ["10 s", 10]]) {
+    await page.locator("#span").selectOption(name);
+    await until(`${name} until now`, async () => {
+      const [from, to] = await plotted();
+      return Math.abs(to - from - span_s) < 1e-6 && to > paused[1];
+    });
+  }
+  assert.ok(await page.getByRole("button", { name: "Pause plots", exact: true }).isVisible());
+
+  // Each plot has a text alternative with its values.
+  const plots = page.locator("#curves [role=img]");
+  assert.equal(await plots.count(), 4);
+  await until("the text alternatives", async () => {
+    const labels = await plots.evaluateAll((all) => all.map((one) => one.getAttribute("aria-label")));
+    return labels.every((label) => /: \w+ -?[\d.]+( to -?[\d.]+)? (N|mN·m|mm|kg·mm²)/.test(label));
+  });
+
   await page.keyboard.press("?");
   await until("the keys are listed", () => page.locator("#keys").isVisible());
   await page.keyboard.press("Enter");

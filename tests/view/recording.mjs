@@ -31,7 +31,7 @@ const length3 = ([x, y, z]) => Math.hypot(x, y, z);
 
 test(async () => {
   const recording = file("run.h5");
-  await finished("wrenchd", ["--virtual-time", "--seconds", "8", "--arm", "--record", recording, "--control", "none"]);
+  await finished("wrenchd", ["--virtual-time", "--seconds", "12", "--arm", "--record", recording, "--control", "none"]);
   const script = file("columns.py");
   writeFileSync(script, COLUMNS);
   const numbers = [100, 2500, 3210, 4000, 5555, 6789, -1];
@@ -81,15 +81,45 @@ with h5py.File(sys.argv[1], "r+") as file:
   }
 
   // At the end: the curves and the histogram have the extremes of single ticks.
-  const most = await page.evaluate(() => Math.max(...window.view.history().values[3]));
+  await until("the curves of the end", () => page.evaluate((end) => Math.abs(window.view.history().time(window.view.history().rows - 1) - end) < 0.1, columns.end));
+  const most = await page.evaluate(() => window.view.history().extremes("force", -Infinity, Infinity)[1]);
   near(most, columns.most_force_N, 1e-9, "the greatest force of the curve");
   const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.tick_duration.max_us));
   near(longest, columns.longest_us, 1e-6, "the longest tick");
   assert.ok((await page.evaluate(() => window.view.world().triangles)) > 20);
 
+  // A drag in a plot zooms, a click goes to its time, and a double click returns. The cursor shows the values of all plots.
+  const box = await page.locator("#plot-force .u-over").boundingBox();
+  const at = (share) => [box.x + share * box.width, box.y + box.height / 2];
+  await page.mouse.move(...at(0.6));
+  assert.equal(await page.locator(".readout:visible").count(), 4);
+  assert.match(await page.locator("#plot-force .readout").textContent(), /norm [\d.]+.* N.*x .* N/);
+  await page.mouse.down();
+  await page.mouse.move(...at(0.7), { steps: 4 });
+  await page.mouse.up();
+  const [from, to] = await until("the zoom", () => page.evaluate(() => window.view.plots().held));
+  near(to - from, 1, 0.1, "the width of the zoom");
+  await page.keyboard.press("0");
+  assert.equal(await page.evaluate(() => window.view.plots().held), null);
+  await page.mouse.click(...at(0.5));
+  await until("the time of the click", async () => Math.abs(Number.parseFloat(await text(page, "play-time")) - (columns.end - 5)) < 0.1);
+  await page.mouse.dblclick(...at(0.8));
+  assert.equal(await page.evaluate(() => window.view.plots().held), null);
+
+  // The text alternatives have the extremes of the shown curves.
+  const alternative = () => page.locator("#plot-force").getAttribute("aria-label");
+  const shownForce = await page.evaluate(() => window.view.history().extremes("force", ...window.view.plots().window)[1].toFixed(3));
+  await until("the text alternative of the end", async () => (await alternative()).includes(`norm 0.000 to ${shownForce} N`));
+
+  // The overview goes to a time of the whole recording.
+  const strip = await page.locator("#overview").boundingBox();
+  await page.mouse.click(strip.x + strip.width / 4, strip.y + strip.height / 2);
+  await until("a quarter of the recording", async () => Math.abs(Number.parseFloat(await text(page, "play-time")) - columns.end / 4) < 0.05);
+
   // Keys: to the beginning, a tick, a tenth of a second, play, pause.
   await page.keyboard.press("Home");
   await until("the beginning", async () => (await text(page, "play-time")) === "0.000 s");
+  await until("a window that begins with the recording", () => page.evaluate(() => window.view.plots().window.join() === "0,10"));
   await page.keyboard.press("ArrowRight");
   await until("a tenth of a second", async () => (await text(page, "play-time")) === "0.100 s");
   await page.keyboard.press("Space");
@@ -98,4 +128,28 @@ with h5py.File(sys.argv[1], "r+") as file:
   await page.keyboard.press("Space");
   assert.equal(await text(page, "play"), "Play");
   assert.deepEqual(page.complaints(), []);
+  await page.close();
+  await compared(recording);
 });
+
+/** A second, shorter recording: its curves and its tool are shown while it lasts. */
+async function compared(recording) {
+  const other = file("other.h5");
+  await finished("wrenchd", ["--virtual-time", "--seconds", "6", "--arm", "--record", other, "--control", "none"]);
+  const { url } = await view([recording, "--compare", other]);
+  const page = await open(url);
+  await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
+  assert.match(await text(page, "compared"), /^solid: run\.h5; dashed: other\.h5$/);
+  assert.equal(await text(page, "key-second"), "other.h5");
+  await page.locator("#scrub").focus();
+  await page.keyboard.press("End");
+  await until("the end without the second tool", () => page.evaluate(() => window.view.frame().t > 11 && !window.view.world().second));
+  for (let i = 0; i < 8; ++i) await page.keyboard.press("Shift+ArrowLeft");
+  await until("both tools", () => page.evaluate(() => window.view.frame().t < 5 && window.view.world().tool && window.view.world().second));
+  await until("the curves of both", () => page.evaluate(() => window.view.plots().data().length === 2 &&
+    window.view.plots().data().every((rows) => rows.extremes("force", 3, 5)?.[1] > 0.1)));
+  const lines = await page.evaluate(() => window.view.plots().curves[0].plot.series.map(({ dash }) => Boolean(dash)));
+  assert.deepEqual(lines, [false, false, false, false, false, true, true, true, true]);
+  assert.match(await page.locator("#plot-force").getAttribute("aria-label"), /; compared, norm [\d.]+/);
+  assert.deepEqual(page.complaints(), []);
+}

@@ -16,7 +16,13 @@ class ViewCommand final : public Subcommand {
                            "Serve a page to browsers on this machine that shows scene, contacts\n"
                            "and wrench of a running daemon, or of a recording");
     view->group(kDaemonGroup);
-    view->add_option("recording", options_.recording, "HDF5 file of wrenchd --record; without it, the daemon")
+    CLI::Option* const recording = view->add_option("recording", options_.recording,
+                                                    "HDF5 file of wrenchd --record; without it, the daemon")
+                                       ->check(not_empty());
+    view->add_option(
+            "--compare", options_.compared,
+            "second recording: its curves are dashed, its tool is a ghost, on the time axis of the first")
+        ->needs(recording)
         ->check(not_empty());
     view->add_option("--port", options_.port, "port on 127.0.0.1; 0: a free port")->capture_default_str();
     view->add_option("--socket", options_.socket, "the daemon's control socket; default as for status")

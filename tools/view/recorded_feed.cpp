@@ -12,6 +12,9 @@ namespace wrenchd {
 namespace {
 
 constexpr double kNs = 1e9;
+/// Up to this number of ticks per column, columns are made from the ticks, else from the buckets of the
+/// history.
+constexpr std::size_t kTicksPerColumn = 20;
 
 }  // namespace
 
@@ -59,9 +62,23 @@ Json RecordedFeed::frame(double t_s) const {
                     scene_.get(), begin_ns());
 }
 
-std::pair<std::uint64_t, std::uint64_t> RecordedFeed::bucket_range(double t_s) const {
-  const std::int64_t to = time_ns(t_s);
-  return {history_.index_at(to - std::llround(kHistory_s * kNs)), history_.index_at(to + 1)};
+MinMaxColumns RecordedFeed::columns(double from_s, double to_s, std::size_t count) const {
+  MinMaxColumns out(time_ns(from_s), time_ns(to_s), count);
+  const std::size_t first = index_at(from_s), last = index_at(to_s);
+  if (last - first <= kTicksPerColumn * count) {
+    for (std::size_t i = first; i <= last; ++i) {
+      const ChannelValues values = view_tick(recording_.ticks[i]).channels();
+      out.add({recording_.ticks[i].now_ns, values, values});
+    }
+    return out;
+  }
+  const std::uint64_t end = history_.index_at(out.to_ns() + 1);
+  for (std::uint64_t i = history_.index_at(out.from_ns()); i < end; ++i) out.add(history_.at(i));
+  return out;
+}
+
+bool RecordedFeed::has_scene_of(const RecordedFeed& other) const {
+  return recording_.header.scene == other.recording_.header.scene;
 }
 
 std::pair<RollingHistogram::Summary, RollingHistogram::Summary> RecordedFeed::tick_times(double t_s) const {

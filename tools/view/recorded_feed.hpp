@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/recording/recording_file.hpp"
+#include "tools/view/min_max_columns.hpp"
 #include "tools/view/min_max_history.hpp"
 #include "tools/view/rolling_histogram.hpp"
 #include "tools/view/view_scene.hpp"
@@ -18,7 +19,6 @@ namespace wrenchd {
 class RecordedFeed {
  public:
   static constexpr std::int64_t kBucket_ns = 10'000'000;
-  static constexpr double kHistory_s = 10.0;
 
   /// name: title for the user. scene: null if unknown; scene_error then contains the reason. Throws
   /// RecordingError if the recording has no ticks.
@@ -35,13 +35,15 @@ class RecordedFeed {
 
   /// Returns the last tick that began at or before this time since the start [s], as a frame message.
   Json frame(double t_s) const;
-  const MinMaxHistory& history() const noexcept { return history_; }
-  /// Returns the range of history buckets in the ten seconds before this time.
-  std::pair<std::uint64_t, std::uint64_t> bucket_range(double t_s) const;
+  /// Returns the curves from one time since the start to another [s], in at most `count` columns. A column
+  /// is one tick if the range has few ticks.
+  MinMaxColumns columns(double from_s, double to_s, std::size_t count) const;
   /// Returns tick durations and wake latencies in the ten seconds before this time.
   std::pair<RollingHistogram::Summary, RollingHistogram::Summary> tick_times(double t_s) const;
   /// Returns the changes of the loop state: [{t, state, cause}, ...].
   Json state_changes() const;
+  /// Returns true if the scene files of both recordings have the same text.
+  bool has_scene_of(const RecordedFeed& other) const;
   /// Returns the markers of the experiment: [{t, label, conditions}, ...]. t: time since the first tick [s].
   Json markers() const;
 

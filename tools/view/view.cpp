@@ -77,6 +77,9 @@ void run_view(const ViewOptions& options) {
     ViewServer server(options.port, std::move(files), feed);
     return serve(server, options);
   }
+  std::optional<RecordedFeed> compared;  // read first: if it cannot be opened, no scene is prepared in vain
+  if (!options.compared.empty())
+    compared.emplace(options.compared.filename().string(), read_recording(options.compared), nullptr, "");
   Recording recording = read_recording(options.recording);
   std::shared_ptr<const ViewScene> scene;
   std::string why;
@@ -89,6 +92,12 @@ void run_view(const ViewOptions& options) {
     }
   const RecordedFeed feed(options.recording.filename().string(), std::move(recording), std::move(scene), why);
   ViewServer server(options.port, std::move(files), feed);
+  if (compared) {
+    if (!compared->has_scene_of(feed))
+      std::fprintf(stderr, "wrenchctl: %s has another scene; its tool is drawn with the shape of %s\n",
+                   compared->name().c_str(), feed.name().c_str());
+    server.compare_with(*compared);
+  }
   serve(server, options);
 }
 

@@ -10,6 +10,7 @@ namespace wrenchd {
 /// Options of `wrenchctl view`.
 struct ViewOptions {
   std::filesystem::path recording;  ///< recording to show; empty: the running daemon
+  std::filesystem::path compared;   ///< second recording beside the first one; empty: none
   std::string socket;               ///< path of the daemon's socket; empty: default paths
   std::uint16_t port = 0;           ///< 0: a free port
   bool open_browser = false;        ///< opens the page in a browser with xdg-open

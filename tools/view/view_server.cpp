@@ -8,6 +8,7 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -50,6 +51,9 @@ constexpr auto kRequestWithin = 20s;
 constexpr std::size_t kMaxConnections = 32;
 /// Maximum number of unsent messages per page; above it the server closes the connection.
 constexpr std::size_t kMaxWaiting = 256;
+constexpr std::size_t kMaxColumns = 1000;  ///< maximum number of columns of a curve
+/// A change of the time in a recording by more than this [s] updates the tick durations at once.
+constexpr double kTimesWithin_s = 1.0;
 constexpr std::size_t kMaxMessageBytes = 4096;  ///< maximum size of a message from a page [bytes]
 
 std::string random_token() {
@@ -131,6 +135,7 @@ struct ViewServer::Server {
   std::uint16_t port = 0;
   LiveFeed* live = nullptr;
   const RecordedFeed* recorded = nullptr;
+  const RecordedFeed* compared = nullptr;  ///< a second recording beside `recorded`; null: none
   std::map<std::uint64_t, std::weak_ptr<Page>> pages;
   std::uint64_t last_page = 0;
   std::size_t connections = 0;
@@ -260,7 +265,13 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
                     {"rate_Hz", feed->rate_Hz()},
                     {"changes", feed->state_changes()},
                     {"markers", feed->markers()}});
+      if (const RecordedFeed* other = server_.compared)
+        hello["compared"] = {{"name", other->name()},
+                             {"recorded_by", other->version()},
+                             {"duration_s", other->duration_s()},
+                             {"same_scene", other->has_scene_of(*feed)}};
       send(hello);
+      send_columns(ColumnsFor::overview, 0.0, feed->duration_s(), kMaxColumns);
       if (feed->scene()) show(feed->scene());
       if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"error", feed->scene_error()}});
       at(0.0);
@@ -279,15 +290,8 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
 
   /// Sends the state of a recording at this time.
   void at(double t_s) {
-    const RecordedFeed& feed = *server_.recorded;
-    const auto [from, to] = feed.bucket_range(t_s);
-    const bool goes_on = history_at_ >= from && history_at_ <= to && history_at_ > 0;
-    send(std::make_shared<const std::string>(
-             history_message(feed.history(), goes_on ? history_at_ : from, to, !goes_on, feed.begin_ns())),
-         false);
-    history_at_ = to;
     const auto now = std::chrono::steady_clock::now();
-    if (!goes_on || now >= times_at_) {
+    if (std::abs(t_s - times_t_s_) > kTimesWithin_s || now >= times_at_) {
       times_at_ = now + kTimesEvery;
       times_timer_.cancel();
       tell_times(t_s);
@@ -297,10 +301,35 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
         if (!error) self->tell_times(t_s);
       });
     }
-    send(feed.frame(t_s));  // sent last: the page requests the next frame when this one arrives
+    Json frame = server_.recorded->frame(t_s);
+    if (const RecordedFeed* other = server_.compared)
+      frame["compared"] = t_s <= other->duration_s() ? other->frame(t_s) : Json(nullptr);
+    send(frame);  // sent last: the page requests the next frame when this one arrives
+  }
+
+  /// Sends the curves of both recordings in this range.
+  void send_columns(ColumnsFor purpose, double from_s, double to_s, std::size_t count) {
+    std::uint32_t number = 0;
+    for (const RecordedFeed* feed : {server_.recorded, server_.compared}) {
+      if (feed != nullptr)
+        send(std::make_shared<const std::string>(
+                 columns_message(purpose, number, feed->columns(from_s, to_s, count), feed->begin_ns())),
+             false);
+      ++number;
+    }
+  }
+
+  /// Message {range: [begin [s], end [s], number of columns]}: the range of the page's plots.
+  void plot(const Json& message) {
+    const auto range = numbers_of<3>(message, "range");
+    if (!range) return disconnect();
+    const auto [from_s, to_s, count] = *range;
+    send_columns(ColumnsFor::plots, from_s, to_s,
+                 static_cast<std::size_t>(std::clamp(count, 2.0, static_cast<double>(kMaxColumns))));
   }
 
   void tell_times(double t_s) {
+    times_t_s_ = t_s;
     const auto [took, late] = server_.recorded->tick_times(t_s);
     send(times_json(took, late));
   }
@@ -321,6 +350,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     const std::string type = message["type"];
     if (server_.recorded != nullptr) {
       if (type == "at" && message.contains("t") && message["t"].is_number()) at(message["t"].get<double>());
+      if (type == "plot") plot(message);
       return;
     }
     PageLease& lease = *server_.lease;
@@ -374,6 +404,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   std::string scene_error_;
   std::uint64_t history_of_ = 0, history_at_ = 0;
   std::chrono::steady_clock::time_point times_at_{};
+  double times_t_s_ = std::numeric_limits<double>::infinity();  ///< time of the last tick durations [s]
   asio::steady_timer times_timer_{socket_.get_executor()};
 };
 
@@ -590,6 +621,10 @@ ViewServer::ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& 
 }
 
 ViewServer::~ViewServer() = default;
+
+void ViewServer::compare_with(const RecordedFeed& other) noexcept {
+  server_->compared = &other;
+}
 
 std::string ViewServer::url() const {
   return "http://127.0.0.1:" + std::to_string(server_->port) + "/" + server_->token + "/";

@@ -42,6 +42,10 @@ class ViewServer {
   ViewServer(const ViewServer&) = delete;
   ViewServer& operator=(const ViewServer&) = delete;
 
+  /// Shows a second recording beside the first one, on the same time axis. The feed must outlive this object.
+  /// Call before run().
+  void compare_with(const RecordedFeed& other) noexcept;
+
   std::string url() const;
   /// opened: called on the thread of run() when a browser has requested the page for the first time.
   void on_first_page(std::function<void()> opened);

@@ -13,6 +13,7 @@
 #include "daemon/control/scene_geometry.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
 #include "daemon/servo/record_fields.hpp"
+#include "tools/view/contact_forces.hpp"
 
 namespace wrenchd {
 namespace {
@@ -62,6 +63,23 @@ HandWrench hand_wrench(const ViewTick& tick, const ViewScene* scene) {
   if (!scene->wrench_about_handle()) return {p_WH_m, force, torque - p_WH_m.cross(force)};
   const Quaterniond& R_WB = scene->X_WB().rotation;
   return {p_WH_m, R_WB * force, R_WB * torque};
+}
+
+constexpr std::uint32_t kBucketDoubles = 1 + 2 * kChannelCount;
+
+double seconds(std::int64_t ns) {
+  return 1e-9 * static_cast<double>(ns);
+}
+
+/// Appends time, then minimum and maximum of each channel.
+void append(std::string& out, const MinMaxHistory::Bucket& bucket, std::int64_t begin_ns) {
+  std::array<double, kBucketDoubles> row{};
+  row[0] = seconds(bucket.begin_ns - begin_ns);
+  for (std::size_t k = 0; k < kChannelCount; ++k) {
+    row[1 + 2 * k] = bucket.min[k];
+    row[2 + 2 * k] = bucket.max[k];
+  }
+  out.append(reinterpret_cast<const char*>(row.data()), sizeof row);
 }
 
 /// "vertex 12", "edge 3-7".
@@ -157,16 +175,22 @@ ViewStatus view_status(const TickRecord& record, std::vector<ProxyContact> conta
 
 Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene* scene,
                 std::int64_t begin_ns) {
+  const HandWrench wrench = hand_wrench(tick, scene);
+  std::vector<double> forces_N(status.contacts.size(), std::nan(""));
+  if (scene != nullptr)  // without a scene the frame of the wrench is unknown
+    forces_N = contact_forces_N(status.contacts, wrench.p_WH_m, wrench.force_W, wrench.torque_W);
   Json contacts = Json::array();
-  for (const ProxyContact& contact : status.contacts)
+  for (std::size_t i = 0; i < status.contacts.size(); ++i) {
+    const ProxyContact& contact = status.contacts[i];
     contacts.push_back(
         {{"p", numbers(contact.point_W_m)},
          {"n", numbers(contact.normal_W)},
          {"load_fraction", number(contact.load_fraction)},
+         {"force_N", number(forces_N[i])},
          {"obstacle", scene != nullptr ? scene->obstacle_name(contact.obstacle_number) : contact.obstacle},
          {"tool", contact.tool_feature},
          {"on", contact.obstacle_feature}});
-  const HandWrench wrench = hand_wrench(tick, scene);
+  }
   return {{"type", "frame"},
           {"t", 1e-9 * static_cast<double>(tick.time_ns - begin_ns)},
           {"tick", tick.tick},
@@ -194,20 +218,23 @@ Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene*
 
 std::string history_message(const MinMaxHistory& history, std::uint64_t from, std::uint64_t to, bool reset,
                             std::int64_t begin_ns) {
-  constexpr std::uint32_t kNumbers = 1 + 2 * kChannelCount;
   const std::array<std::uint32_t, 4> head = {2, reset ? 1U : 0U, static_cast<std::uint32_t>(to - from),
-                                             kNumbers};
+                                             kBucketDoubles};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
-  std::array<double, kNumbers> row{};
-  for (std::uint64_t i = from; i < to; ++i) {
-    const MinMaxHistory::Bucket& bucket = history.at(i);
-    row[0] = 1e-9 * static_cast<double>(bucket.begin_ns - begin_ns);
-    for (std::size_t k = 0; k < kChannelCount; ++k) {
-      row[1 + 2 * k] = bucket.min[k];
-      row[2 + 2 * k] = bucket.max[k];
-    }
-    out.append(reinterpret_cast<const char*>(row.data()), sizeof row);
-  }
+  for (std::uint64_t i = from; i < to; ++i) append(out, history.at(i), begin_ns);
+  return out;
+}
+
+std::string columns_message(ColumnsFor purpose, std::uint32_t recording, const MinMaxColumns& columns,
+                            std::int64_t begin_ns) {
+  const std::array<std::uint32_t, 4> head = {static_cast<std::uint32_t>(purpose), recording,
+                                             static_cast<std::uint32_t>(columns.columns().size()),
+                                             kBucketDoubles};
+  const std::array<double, 2> range = {seconds(columns.from_ns() - begin_ns),
+                                       seconds(columns.to_ns() - begin_ns)};
+  std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
+  out.append(reinterpret_cast<const char*>(range.data()), sizeof range);
+  for (const MinMaxHistory::Bucket& column : columns.columns()) append(out, column, begin_ns);
   return out;
 }
 

@@ -12,6 +12,7 @@
 #include "collision/touch.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/servo/tick_record.hpp"
+#include "tools/view/min_max_columns.hpp"
 #include "tools/view/min_max_history.hpp"
 #include "tools/view/view_scene.hpp"
 
@@ -70,6 +71,18 @@ Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene*
 /// discard its history, u32 number of buckets, u32 doubles per bucket. Each bucket: time [s], then minimum
 /// and maximum of each channel. Not RT-safe: allocates.
 std::string history_message(const MinMaxHistory& history, std::uint64_t from, std::uint64_t to, bool reset,
+                            std::int64_t begin_ns);
+
+/// Purpose of a message with columns.
+enum class ColumnsFor : std::uint32_t {
+  plots = 4,     ///< the range that the page has requested
+  overview = 5,  ///< the whole recording, to select a time in it
+};
+
+/// Returns a binary message with columns of a recording. Header: u32 purpose, u32 number of the recording
+/// (0: the shown one, 1: the compared one), u32 number of columns, u32 doubles per column, two doubles with
+/// begin and end of the range [s]. Each column as a bucket of history_message(). Not RT-safe: allocates.
+std::string columns_message(ColumnsFor purpose, std::uint32_t recording, const MinMaxColumns& columns,
                             std::int64_t begin_ns);
 
 }  // namespace wrenchd

@@ -4,6 +4,8 @@
 const KIND_MESH = 1;
 const KIND_HISTORY = 2;
 const KIND_SIMPLIFIED = 3;
+const KIND_PLOTS = 4;
+const KIND_OVERVIEW = 5;
 
 /** Decodes a mesh: its number, vertices with normals, triangle indices, and lines; lengths in metres. */
 function meshOf(buffer) {
@@ -25,8 +27,15 @@ function historyOf(buffer) {
   return { reset: reset === 1, rows, width, numbers: new Float64Array(buffer, 16, rows * width) };
 }
 
+/** Decodes the columns of a recording: 0 is the shown one, 1 the compared one. */
+function columnsOf(buffer) {
+  const [, recording, rows, width] = new Uint32Array(buffer, 0, 4);
+  const [from, to] = new Float64Array(buffer, 16, 2);
+  return { recording, from, to, rows, numbers: new Float64Array(buffer, 32, rows * width) };
+}
+
 export class Connection {
-  /** handlers: functions by message type, and mesh, history, lost. */
+  /** handlers: functions by message type, and mesh, history, columns, overview, lost. */
   constructor(handlers) {
     this.handlers = handlers;
     this.calls = new Map();  // promises of calls without a reply, by their id
@@ -53,6 +62,8 @@ export class Connection {
       const kind = new Uint32Array(data, 0, 1)[0];
       if (kind === KIND_MESH || kind === KIND_SIMPLIFIED) this.handlers.mesh(meshOf(data));
       if (kind === KIND_HISTORY) this.handlers.history(historyOf(data));
+      if (kind === KIND_PLOTS) this.handlers.columns(columnsOf(data));
+      if (kind === KIND_OVERVIEW) this.handlers.overview(columnsOf(data));
       return;
     }
     const message = JSON.parse(data);

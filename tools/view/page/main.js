@@ -5,7 +5,9 @@ import { ToolDrag } from "./drag.js";
 import { Drawer } from "./drawer.js";
 import { $ } from "./elements.js";
 import { showMeasure } from "./measure.js";
-import { History, Plots } from "./plots.js";
+import { Rows } from "./curve_data.js";
+import { Overview } from "./overview.js";
+import { Plots } from "./plots.js";
 import { World } from "./world.js";
 
 const root = document.documentElement;
@@ -16,8 +18,8 @@ const STATES = { gone: "connection lost" };
 const ARMED = ["waiting", "ramping", "active", "degraded"];
 
 const world = new World($("canvas"));
-const plots = new Plots();
-const history = new History();
+const plots = new Plots({ seek: (t) => select(t) });
+const overview = new Overview($("overview"), { seek: (t) => select(t) });
 
 let mode = "none";
 let page = 0;
@@ -76,16 +78,16 @@ function showContacts(contacts) {
   while (body.rows.length > contacts.length) body.deleteRow(-1);
   while (body.rows.length < contacts.length) {
     const row = body.insertRow();
-    for (let i = 0; i < 4; ++i) row.insertCell();
+    for (let i = 0; i < 5; ++i) row.insertCell();
     const meter = document.createElement("meter");
     meter.max = 1;
     row.cells[0].append(meter, document.createElement("span"));
   }
-  contacts.forEach(({ load_fraction, obstacle, tool, on }, i) => {
+  contacts.forEach(({ load_fraction, force_N, obstacle, tool, on }, i) => {
     const [cell, ...others] = body.rows[i].cells;
     cell.firstChild.value = load_fraction ?? 0;
     cell.lastChild.textContent = ` ${fixed(100 * (load_fraction ?? 0), 0)} %`;
-    [obstacle, tool, on].forEach((text, k) => {
+    [`${fixed(force_N, 2)} N`, obstacle, tool, on].forEach((text, k) => {
       if (others[k].textContent !== text) others[k].textContent = text;
     });
   });
@@ -231,6 +233,21 @@ function seek(t) {
   player.stale = true;
 }
 
+/** Goes to a time that the user has selected, and pauses. */
+function select(t) {
+  play(false);
+  seek(t);
+}
+
+/** Requests the curves of the plots' window, one request at a time. */
+function requestColumns() {
+  const range = plots.request(), key = range.join();
+  if (player.columnsRequested || key === player.columnsKey) return;
+  player.columnsRequested = true;
+  player.columnsKey = key;
+  connection.send("plot", { range });
+}
+
 function requestFrame() {
   if (player.requested || !player.stale) return;
   player.requested = true;
@@ -255,7 +272,12 @@ const connection = new Connection({
     if (mode !== "recording") return drawer.setScenes(hello.scenes);
     connected = true;
     rate_Hz = hello.rate_Hz;
-    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, markers: hello.markers, requested: false });
+    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, markers: hello.markers, requested: false,
+      columnsRequested: false, columnsKey: "", compared: hello.compared });
+    plots.showRecording(hello.name, hello.duration_s, hello.compared?.name);
+    overview.setDuration(hello.duration_s);
+    $("key-second").hidden = !hello.compared;
+    if (hello.compared) set("key-second", `${hello.compared.name}${hello.compared.same_scene ? "" : " (another scene)"}`);
     $("scrub").max = hello.duration_s;
     set("play-end", `${hello.duration_s.toFixed(3)} s`);
     set("about", `${hello.name} · recorded by wrenchd ${hello.recorded_by} · ${Math.round(rate_Hz)} Hz`);
@@ -280,7 +302,12 @@ const connection = new Connection({
     $("note").className = error === "" ? "" : "problem";
     set("note", error === "" ? "" : `The scene cannot be shown: ${error}`);
   },
-  history: (message) => history.add(message),
+  history: (message) => plots.history.add(message),
+  columns({ recording, from, to, rows, numbers }) {
+    if (recording === (player.compared ? 1 : 0)) player.columnsRequested = false;
+    plots.setColumns(recording, new Rows(numbers, rows, (to - from) / Math.max(plots.request()[2], 2)));
+  },
+  overview: ({ recording, rows, numbers }) => overview.setRows(recording, new Rows(numbers, rows)),
   frame(now) {
     frame = now;
     player.requested = false;
@@ -340,11 +367,7 @@ for (const from of ["top", "front", "side"]) $(`view-${from}`).onclick = () => l
 $("follow").onclick = toggleFollow;
 $("help").onclick = () => $("keys").showModal();
 $("play").onclick = () => play(!player.playing);
-$("scrub").oninput = () => {
-  const t = Number($("scrub").value);
-  play(false);
-  seek(t);
-};
+$("scrub").oninput = () => select(Number($("scrub").value));
 
 const THEMES = ["auto", "light", "dark"];
 function theme(name) {
@@ -355,6 +378,7 @@ function theme(name) {
   } catch { /* the browser has no storage */ }
   world.recolour();
   plots.recolour();
+  overview.changed = true;
 }
 const nextTheme = () => theme(THEMES[(THEMES.indexOf(root.dataset.theme) + 1) % THEMES.length]);
 $("theme").onclick = nextTheme;
@@ -375,6 +399,11 @@ const common = {
   2: () => look("front"),
   3: () => look("side"),
   l: toggleFollow,
+  p: () => plots.pause(),
+  y: () => plots.toggleFit(),
+  "+": () => plots.zoom(0.5),
+  "-": () => plots.zoom(2),
+  0: () => plots.release(),
   t: nextTheme,
   "?": () => ($("keys").open ? $("keys").close() : $("keys").showModal()),
 };
@@ -392,6 +421,8 @@ addEventListener("keydown", (event) => {
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   // While text is typed, its letters and spaces are text.
   if (event.target.matches("input:not([type=range], [type=checkbox])") && key !== "Escape") return;
+  if (event.target.id === "plot-cursor" && /^(Arrow|Page|Home|End)/.test(key)) return;  // its own keys
+  if (event.target.id === "plot-cursor" && key === "Enter" && plots.cursor !== null) return plots.pick(plots.cursor, false);
   const own = keys[mode][key];
   if (!own && event.target instanceof HTMLSelectElement) return;
   const act = own ?? common[key];
@@ -423,7 +454,11 @@ function draw(now) {
   showTriangleCount();
   if (now - plotted > PLOT_INTERVAL_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
-    plots.draw(history, frame.t);
+    plots.draw(frame.t);
+    if (mode === "recording") {
+      requestColumns();
+      overview.draw(player.t);
+    }
   }
   if (toastEnds > 0 && now > toastEnds) {
     toastEnds = 0;
@@ -447,7 +482,9 @@ window.view = {
   dragging: () => Boolean(toolDrag.drag),
   onScreen: (point) => world.onScreen(point),
   toolOnScreen: () => world.toolOnScreen(),
-  history: () => history,
+  history: () => plots.data()[0],
+  plots: () => plots,
+  arrows: () => world.arrows(),
   times: () => times,
   player,
   slow: () => (world.slow = true),

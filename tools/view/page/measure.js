@@ -27,6 +27,6 @@ export function showMeasure(world) {
   const { right, up, forward } = world.screenAxes();
   ["x", "y", "z"].forEach((name, i) => showAxis(name, right[i], -up[i], forward[i] > 0.3));
   const { length_m, width_px, force_N } = world.scale();
-  $("scale-text").textContent = `${lengthText(length_m)}; force arrow ${digits(force_N, 2)} N`;
+  $("scale-text").textContent = `${lengthText(length_m)}; force arrows ${digits(force_N, 2)} N`;
   $("scale-line").style.width = `${width_px.toFixed(0)}px`;
 }

@@ -37,14 +37,49 @@ const UP = new THREE.Vector3(0, 1, 0);
  */
 const VIEWPOINTS = { top: [-1e-4, 0, 1], front: [-1, 0, 0], side: [0, -1, 0] };
 
+const INSIDE = 0.96;  // of the half width and half height of the picture
+
+/** Returns the share of a line that is inside the picture, from its start; 1 if its start is outside. */
+function shareInside(from, along, camera) {
+  const inside = (share) => {
+    const at = from.clone().addScaledVector(along, share).project(camera);
+    return Math.abs(at.x) <= INSIDE && Math.abs(at.y) <= INSIDE && at.z < 1;
+  };
+  if (inside(1) || !inside(0)) return 1;
+  let low = 0, high = 1;
+  for (let i = 0; i < 20; ++i) {
+    const middle = (low + high) / 2;
+    if (inside(middle)) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
 /** An arrow of any length and thickness, along +Y before its rotation. */
 class Arrow extends THREE.Group {
   constructor(material) {
     super();
     this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), material);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 24).translate(0, 0.5, 0), material);
-    this.add(this.shaft, this.head);
+    this.second = new THREE.Mesh(this.head.geometry, material);
+    this.second.visible = false;
+    this.add(this.shaft, this.head, this.second);
     this.renderOrder = 3;
+  }
+
+  /** Sets the arrow without the borders of the picture; fitInto() then draws it. */
+  aim(from, along, thickness) {
+    this.aimed = { from: from.clone(), along, thickness };
+    this.point(from, along, thickness);
+  }
+
+  /** Shortens the arrow so that it ends inside the picture; a shortened arrow has a second head. */
+  fitInto(camera) {
+    if (!this.aimed || !this.visible) return;
+    const { from, along, thickness } = this.aimed;
+    const share = shareInside(from, along, camera);
+    this.point(from, along.clone().multiplyScalar(share), thickness);
+    this.second.visible = share < 1;
   }
 
   /** from, along: Vector3; the length of `along` is the arrow's length [m]. */
@@ -58,6 +93,8 @@ class Arrow extends THREE.Group {
     this.shaft.scale.set(thickness, length - head, thickness);
     this.head.position.y = length - head;
     this.head.scale.set(0.45 * head, head, 0.45 * head);
+    this.second.position.y = length - 2 * head;
+    this.second.scale.copy(this.head.scale);
   }
 }
 
@@ -104,6 +141,8 @@ export class World {
       edge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }),
       ghostEdge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
       grid: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.3 }),
+      second: new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35, depthWrite: false, ...behind(3) }),
+      secondEdge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }),
       contact: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }),
       force: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
       torque: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
@@ -145,6 +184,8 @@ export class World {
     set("edge", "--edge");
     set("ghostEdge", "--ghost");
     set("grid", "--edge");
+    set("second", "--second");
+    set("secondEdge", "--second");
     set("contact", "--contact");
     set("force", "--force");
     set("torque", "--torque");
@@ -205,8 +246,10 @@ export class World {
     this.tool = this.body(tool.mesh, this.materials.tool, this.materials.edge);
     this.ghost = this.body(tool.mesh, this.materials.ghost, this.materials.ghostEdge);
     this.ghost.renderOrder = 2;
-    this.tool.visible = this.ghost.visible = false;
-    this.bodies.add(this.tool, this.ghost);
+    this.second = this.body(tool.mesh, this.materials.second, this.materials.secondEdge);  // of the compared recording
+    this.second.renderOrder = 2;
+    this.tool.visible = this.ghost.visible = this.second.visible = false;
+    this.bodies.add(this.tool, this.ghost, this.second);
     this.obstacles = obstacles.map((one) => {
       const body = one.half_space ? this.plane(one.half_space) : this.body(one.mesh, one.moves ? this.materials.moving : this.materials.obstacle, this.materials.edge);
       if (one.pose) place(body, one.pose);
@@ -244,6 +287,8 @@ export class World {
       if (this.followed) this.followTool();
       this.tool.visible = frame.q !== null;
       if (frame.q !== null) place(this.tool, frame.q);
+      this.second.visible = Boolean(frame.compared);
+      if (frame.compared) place(this.second, frame.compared.q ?? frame.compared.p);
     }
     for (const [number, pose] of frame.moved) if (this.obstacles[number]) place(this.obstacles[number], pose);
     this.showContacts(frame.contacts);
@@ -262,17 +307,19 @@ export class World {
     this.contacts.forEach(({ point, normal }, i) => {
       point.visible = normal.visible = i < contacts.length;
       if (i >= contacts.length) return;
-      const { p, n, load_fraction } = contacts[i];
+      const { p, n, load_fraction, force_N } = contacts[i];
       point.position.set(...p);
       point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(load_fraction ?? 0)));
-      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (load_fraction ?? 0))), 0.014 * this.size);
+      // Also a contact without force shows its normal.
+      const length = Math.max(0.15, ARROW_RADII_PER_N * (force_N ?? 0)) * this.size;
+      normal.aim(point.position, new THREE.Vector3(...n).multiplyScalar(length), 0.014 * this.size);
     });
   }
 
   /** Draws the wrench: the arrow of 3 N has twice the tool radius; the arc of 0.1 N.m has about the tool radius. */
   push({ at, force, torque }) {
     const from = new THREE.Vector3(...at), f = new THREE.Vector3(...force), m = new THREE.Vector3(...torque);
-    this.force.point(from, f.multiplyScalar(ARROW_RADII_PER_N * this.size), 0.03 * this.size);
+    this.force.aim(from, f.multiplyScalar(ARROW_RADII_PER_N * this.size), 0.03 * this.size);
     const strength = m.length();
     const radius = strength < 1e-3 ? 0 : this.size * Math.min(0.25 + strength / 0.1, 1.5);
     this.torque.about(from, strength > 0 ? m.divideScalar(strength) : UP, radius);
@@ -402,8 +449,18 @@ export class World {
     this.drawSimplified(this.slow === true && !atRest);
     this.changed = false;
     this.drawnAt = now;
+    this.camera.updateMatrixWorld();
+    for (const arrow of [this.force, ...this.contacts.map(({ normal }) => normal)]) arrow.fitInto(this.camera);
     this.renderer.render(this.scene, this.camera);
     this.drawn = (this.drawn ?? 0) + 1;
+  }
+
+  /** Returns start and tip of the visible arrows on the screen, for tests. */
+  arrows() {
+    return [this.force, ...this.contacts.map(({ normal }) => normal)].filter(({ visible }) => visible).map((arrow) => {
+      const along = new THREE.Vector3(0, arrow.head.position.y + arrow.head.scale.y, 0).applyQuaternion(arrow.quaternion);
+      return [this.onScreen(arrow.position.toArray()), this.onScreen(along.add(arrow.position).toArray())];
+    });
   }
 
   /** Returns the drawn poses and camera, for tests. */
@@ -412,6 +469,7 @@ export class World {
     return {
       tool: pose(this.tool),
       ghost: pose(this.ghost),
+      second: pose(this.second),
       obstacles: this.obstacles.map(pose),
       contacts: this.contacts.filter(({ point }) => point.visible).map(({ point }) => point.position.toArray()),
       force: this.force.visible ? new THREE.Vector3(0, 1, 0).applyQuaternion(this.force.quaternion).toArray() : null,
