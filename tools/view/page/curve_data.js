@@ -110,8 +110,7 @@ class Level extends Rows {
   }
 
   copy() {
-    const copy = new Rows(this.numbers.slice(0, this.rows * WIDTH), this.rows, this.spacing_s);
-    return copy;
+    return new Rows(this.numbers.slice(0, this.rows * WIDTH), this.rows, this.spacing_s);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The force of the whole recording above the slider; a click or a drag goes to that time. The slider is its keyboard path.
-import { css } from "./plots.js";
+import { css } from "./plot_style.js";
 
 export class Overview {
   /** seek: receives the selected time [s]. */

@@ -2,7 +2,7 @@
 // The scene in 3D: bodies, contacts, arrows. Metres, Z up, all in the world frame.
 import * as THREE from "three";
 import { OrbitControls } from "orbit";
-import { css } from "./plots.js";
+import { css } from "./plot_style.js";
 
 const colour = (name) => new THREE.Color(css(name));
 
