@@ -240,7 +240,7 @@ bool ConeProjection::obeys_coulomb(double tolerance_m) const noexcept {
     const double most = (cone.mu + kOutside) * std::max(load, 0.0) + kNoLoad_N;
     const Vector3d friction_N = forces_[i] - load * cone.n;
     if (!(load >= -kNoLoad_N) || !(friction_N.squaredNorm() <= most * most)) return false;
-    // Newton's method also ends where friction drives the slip instead of braking it.
+    // Newton's method can also converge to friction that drives the slip instead of braking it.
     const Vector3d slip_m = slip(cone);
     if (slip_m.norm() > kStick_m && friction_N.dot(slip_m) > kNoLoad_N * slip_m.norm()) return false;
   }

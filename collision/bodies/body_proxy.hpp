@@ -40,8 +40,10 @@ class BodyProxy {
   bool bodies_are_out_of_reach(const Pose& X_WP) const noexcept {
     return world_.bodies_are_out_of_reach(X_WP);
   }
-  /// Instead of follow(), where bodies_are_out_of_reach(): that proxy moved the tool to X_WQ.
+  /// Replaces follow() if bodies_are_out_of_reach(): takes the tool pose X_WQ that this other proxy found.
   void move_tool(const Pose& X_WP, const Pose& X_WQ, double stiffness_per_s2, double time_s) noexcept;
+  /// True if the last step was a move_tool().
+  bool tool_was_moved() const noexcept { return world_.tool_was_moved(); }
   /// wanted: the tool holds the body that it touches, or the first one that it will touch; otherwise it lets
   /// go.
   void set_grasp(bool wanted) noexcept;
@@ -74,9 +76,9 @@ class BodyProxy {
   std::uint32_t first_body_;  ///< obstacle number of the first body
   StaticVector<BodyMotion, SceneSettings::kMaxBodies> starts_;
   std::optional<double> last_time_s_;  ///< scene time of the last step; empty before the first one
-  BodyWorld::Hand hand_;               ///< of the last follow()
+  BodyWorld::Hand hand_;               ///< of the last follow() or move_tool()
   bool grasp_wanted_ = false;          ///< the last set_grasp()
-  double dt_s_ = 0.0, until_s_ = 0.0;  ///< of the last follow()
+  double dt_s_ = 0.0, until_s_ = 0.0;  ///< of the last follow() or move_tool()
 };
 
 }  // namespace wrenchd

@@ -37,7 +37,8 @@ constexpr double kTouch = 1.1;
 constexpr double kBehind = 0.1;
 /// A gap below the clearance opens by at most this multiple of the clearance in a step.
 constexpr double kOpening = 0.01;
-/// What the ball of bodies_are_out_of_reach() is larger by [m]: more than a contact keeps open, and rounding.
+/// Distance that bodies_are_out_of_reach() adds to the reach of the tool [m]. It is larger than the clearance
+/// and than rounding.
 constexpr double kReachMargin_m = 1e-6;
 /// If a sweep finds an overlap but no contact, the contacts with a gap below this multiple of the clearance
 /// at the start are added.
@@ -173,7 +174,7 @@ bool BodyWorld::bodies_are_out_of_reach(const Pose& X_WP) const noexcept {
 }
 
 void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
-  // Nothing but the tool changes between two calls: what save() kept of the rest is still true.
+  // Between two consecutive calls only the tool changes, so the copies of the bodies and contacts stay valid.
   if (!tool_was_moved_) {
     std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
     tool_load_W_ = {};
@@ -188,7 +189,7 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
   tool_was_moved_ = true;
 }
 
-/// Keeps what take_back() returns to.
+/// Copies the state that take_back() restores.
 void BodyWorld::save() noexcept {
   bodies_before_.clear();
   for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});

@@ -88,8 +88,11 @@ class BodyWorld {
   /// the way to the hand's pose X_WP. False in a world where the tool has friction, or obstacles move.
   /// RT-safe.
   bool bodies_are_out_of_reach(const Pose& X_WP) const noexcept;
-  /// Instead of a step, where bodies_are_out_of_reach(): another proxy moved the tool to X_WT. RT-safe.
+  /// Replaces a step if bodies_are_out_of_reach(): takes the tool pose X_WT that another proxy found, and
+  /// scene time until_s [s]. RT-safe.
   void move_tool(const Pose& X_WT, double until_s) noexcept;
+  /// True if the last step was a move_tool(), and no body was placed since. RT-safe.
+  bool tool_was_moved() const noexcept { return tool_was_moved_; }
 
   /// True if the tool may enter at X_WT. It was admissible there with the bodies at X_WB_then and the
   /// obstacles at then_s; nothing has moved into it since. RT-safe.
@@ -227,7 +230,7 @@ class BodyWorld {
   /// last step; of the held body alone.
   Wrench tool_load_W_, tool_load_before_W_, grasp_load_W_;
   bool grasp_broke_ = false;
-  bool tool_was_moved_ = false;       ///< the last step was a move_tool()
+  bool tool_was_moved_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;

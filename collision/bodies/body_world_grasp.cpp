@@ -69,9 +69,9 @@ void BodyWorld::move_held() noexcept {
   X_WQ.rotation.normalize();
 }
 
-/// From the tool's centre of mass to a point of the held body, in axes of W, half way between the poses of
-/// the tick. The centre of the held body moves along a chord: its middle is nearer to that of the tool than
-/// the body ever is, and the point belongs to the body there.
+/// Returns the vector from the tool's centre of mass to a contact point of the held body, in axes of W,
+/// halfway through the tick. The point belongs to the body at the middle of the chord along which its centre
+/// moves. That middle is not at the fixed distance X_TB from the middle of the tool's way.
 Vector3d BodyWorld::arm_of_held(const Vector3d& point_W_m) const noexcept {
   return half_way(0).rotation * grasp_->X_TB.translation_m + point_W_m - half_way(grasp_->body).translation_m;
 }

@@ -60,8 +60,8 @@ class Checksum64 {
   std::uint64_t sum_ = 0xcbf29ce484222325U;
 };
 
-/// Among bodies the proxy follows the hand alone only if BodyProxy, whose clearance and friction count, says
-/// so.
+/// In a scene with bodies, BodyProxy and this proxy take turns, so both have the clearance of BodyProxy. They
+/// take turns only if the tool has no friction.
 PenetrationDepth::Options proxy_options(const Scene& scene, const Settings& settings) {
   const RenderingSettings& rendering = settings.rendering;
   PenetrationDepth::Options options{rendering.method,   rendering.planes,   0.0,
@@ -153,22 +153,19 @@ Penetration Rendering::follow_among_bodies(double scene_time_s) noexcept {
   const double stiffness_per_s2 = std::max(spring_scale_ * energy_stiffness_per_s2_, kLeastStiffness_per_s2);
   scene_time_s_ = scene_time_s;
   if (!first && bodies_->bodies_are_out_of_reach(X_WP_)) {
-    if (!follows_alone_) penetration_.clear_history(scene_time_s);
-    follows_alone_ = true;
+    if (!bodies_->tool_was_moved()) penetration_.clear_history(scene_time_s);
     obstacle_work_kg_m2_ = 0.0;
     const Penetration depth = penetration_.follow(X_WP_, X_WQ_, scene_time_s);
     bodies_->move_tool(X_WP_, depth.projection.X_WQ, stiffness_per_s2, scene_time_s);
     return depth;
   }
-  follows_alone_ = false;
   const Penetration depth = bodies_->follow(X_WP_, stiffness_per_s2, scene_time_s);
   obstacle_work_kg_m2_ = first ? 0.0 : bodies_->work_kg_m2();
   return depth;
 }
 
-/// The tick once more, for another pose of the hand.
+/// Repeats the tick for another pose of the hand.
 void Rendering::follow_among_bodies_again() noexcept {
-  follows_alone_ = false;
   depth_ = bodies_->follow_again(X_WP_);
   obstacle_work_kg_m2_ = bodies_->work_kg_m2();
   X_WQ_ = depth_.projection.X_WQ;
@@ -282,7 +279,7 @@ void Rendering::set_stiffness_scale(const StiffnessScale& scale) noexcept {
 }
 
 Touches Rendering::contacts() const noexcept {
-  if (in_contact() && bodies_ && !follows_alone_) return bodies_->touches();
+  if (in_contact() && bodies_ && !bodies_->tool_was_moved()) return bodies_->touches();
   return in_contact() ? touches(depth_.projection, *scene_, penetration_.uses_mesh_features()) : Touches{};
 }
 

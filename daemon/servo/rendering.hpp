@@ -123,7 +123,6 @@ class Rendering {
   PenetrationDepth penetration_;
   /// Follows the hand in a scene with bodies, unless they sleep out of reach; penetration_ does otherwise.
   std::optional<BodyProxy> bodies_;
-  bool follows_alone_ = false;  ///< penetration_ followed the hand in the last tick of a scene with bodies
   WrenchLaw law_;
   LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.
