@@ -21,21 +21,23 @@ ToolBody box(double side_m, double mass_kg) {
   return tool_body(make_mesh({"box", 12, 1, Vector3d::Constant(side_m)}), 1.0, mass_kg);
 }
 
-/// A plate whose top is at z = 0, and a tool of 20 mm.
+/// A plate whose top is at z = 0, a wall of 40 mm at x = -100 mm, and a tool of 20 mm.
 Scene plate() {
   std::vector<MeshObstacle> obstacles;
+  obstacles.emplace_back("wall", MeshBvh(make_mesh({"box", 12, 1, {0.004, 0.6, 0.04}})),
+                         Pose{Quaterniond::Identity(), {-0.1, 0.0, 0.0201}});
   obstacles.emplace_back("plate", MeshBvh(make_mesh({"box", 12, 1, {0.6, 0.6, 0.02}})),
                          Pose{Quaterniond::Identity(), {0.0, 0.0, -0.01}});
   return {box(0.02, 0.2), {}, {}, std::move(obstacles)};
 }
 
-/// The same with a crate of 50 mm at x = 150 mm.
-Scene plate_with_crate() {
+/// The same with a crate of 50 mm at x = 150 mm; z_m: height of its centre.
+Scene plate_with_crate(double z_m = 0.025) {
   const Scene scene = plate();
   FreeBody crate;
   crate.name = "crate";
   crate.body = box(0.05, 0.3);
-  crate.motion.X_WB.translation_m = {0.15, 0.0, 0.025};
+  crate.motion.X_WB.translation_m = {0.15, 0.0, z_m};
   crate.friction = 0.5;
   crate.mesh = std::make_shared<const MeshBvh>(crate.body.mesh, crate.body.kind);
   MeshLoader loader;
@@ -112,11 +114,30 @@ TEST_CASE("a tool that followed alone meets the sleeping body, and wakes it with
   }
   CHECK(led.rendering.X_WB()[0].translation_m.x() - start_m.x() > 0.03);
   // Back to where the crate is out of reach, until it sleeps again.
-  for (int k = 0; k < 1000; ++k) led.to(0.2 - 0.4 * kTick_s * k, 0.03);
+  for (int k = 0; k < 1000; ++k) led.to(0.2 - 0.25 * kTick_s * k, 0.03);
   const Vector3d left_m = led.rendering.X_WB()[0].translation_m;
-  led.rest_at(-0.2, 0.005, 500);
+  led.rest_at(-0.05, 0.005, 500);
   CHECK(led.rendering.in_contact());
   CHECK(led.rendering.X_WB()[0].translation_m == left_m);
+}
+
+TEST_CASE("a body that is out of reach and not at rest moves on", "[rendering]") {
+  Led led(plate_with_crate(0.1));
+  led.rest_at(-0.05, 0.04, 400);
+  CHECK(led.rendering.X_WB()[0].translation_m.z() == Approx(0.025).margin(1e-6));
+}
+
+TEST_CASE("a tick after many in which the tool followed alone is undone from where the tool is",
+          "[rendering]") {
+  Led led(plate_with_crate());
+  led.rest_at(-0.05, 0.07, kAsleep);
+  for (int k = 0; k < 200; ++k) led.to(-0.05 - 0.0005 * k, 0.07);  // over the wall
+  led.rest_at(-0.15, 0.02, 100);
+  REQUIRE(led.position_m().x() == Approx(-0.15).margin(1e-6));
+  CHECK(led.rendering.move(led.hand(0.3, 0.02)));  // towards the crate, behind the wall
+  CHECK(led.position_m().x() < -0.11);
+  led.rendering.undo_move();
+  CHECK(led.position_m().x() == Approx(-0.15).margin(1e-6));
 }
 
 TEST_CASE("a tick in which the tool followed alone can be moved and undone", "[rendering]") {
