@@ -19,6 +19,7 @@
 #include "daemon/control/record_methods.hpp"
 #include "daemon/control/scene_methods.hpp"
 #include "daemon/control/state_methods.hpp"
+#include "daemon/control/wrench_methods.hpp"
 #include "daemon/device_run.hpp"
 #include "daemon/device_start.hpp"
 #include "daemon/output_queue.hpp"
@@ -65,6 +66,7 @@ std::unique_ptr<ControlInterface> open_control(Runtime& runtime, EventFeed& feed
                       [&] { return reload_all(runtime, feed, context); });
     add_record_methods(control->methods(), recordings);
     add_hand_methods(control->methods(), hand, runtime.config());
+    add_wrench_methods(control->methods(), runtime.loop(), feed, runtime.config());
     control->status_sections()["recording"] = [&recordings] { return recording_json(recordings); };
     control->open(socket.path);
     spdlog::info("control socket: {}", socket.path.string());

@@ -50,7 +50,7 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
 }  // namespace
 
 std::span<const EventRow> feed_events() {
-  static const std::array<EventRow, 12> rows = {{
+  static const std::array<EventRow, 13> rows = {{
       {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "A fault was raised. fault: name, message and cure; value: its measured size, or 0; recording: the "
@@ -65,6 +65,9 @@ std::span<const EventRow> feed_events() {
       {"grasp",
        "The tool holds a free body, or has let go of it. body: its number, from 1 in the order of the scene; "
        "held; broke: its load was larger than the strength of the grasp."},
+      {"external_wrench",
+       "A program begins to act on the hand by method 'wrench.set'. source: who it is. The records of the "
+       "ticks have its wrench."},
       {"arming_rejected", "A request to arm was rejected. state: the state that does not allow it."},
       {"proxy_initialization",
        "The search for a feasible pose of the tool, after each arming. outcome: searching, found "

@@ -37,7 +37,9 @@ constexpr hsize_t kPieceRows = 4 * RecordingWriter::kChunkTicks;
 
 /// Columns of /ticks that a recording of this format may lack, because it is older. Their values are zeros
 /// then.
-constexpr std::array<std::string_view, 1> kLaterFields = {"X_WB"};
+constexpr std::array<std::string_view, 6> kLaterFields = {
+    "X_WB",       "requested_external", "external_energy_J", "external_expires_ns",
+    "F_external", "external_balance_J"};
 
 constexpr std::array kContactRangeFields = {
     RecordField{"first_contact", FieldType::u64, 1, offsetof(TickRow, first_contact), "1", "",

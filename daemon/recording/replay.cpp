@@ -83,6 +83,13 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   return sample;
 }
 
+ExternalWrenchRequest recorded_request(const TickRecord& r) noexcept {
+  const auto& F = r.requested_external;
+  return {{{F[0], F[1], F[2]}, {F[3], F[4], F[5]}},
+          r.external_energy_J,
+          TimePoint(Duration(r.external_expires_ns))};
+}
+
 /// Compares two arrays bit by bit: NaN equals itself, and -0 differs from 0.
 std::optional<Difference> compare(std::uint64_t tick, const char* field, std::span<const double> recorded,
                                   std::span<const double> replayed) {
@@ -112,6 +119,7 @@ constexpr std::array kNumbers = {
     WRENCHD_COMPARED(energy_in_J),
     WRENCHD_COMPARED(energy_out_J),
     WRENCHD_COMPARED(injected_J),
+    WRENCHD_COMPARED(external_balance_J),
     WRENCHD_COMPARED(contact_gain),
     WRENCHD_COMPARED(contacts),
     WRENCHD_COMPARED(iterations),
@@ -134,6 +142,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
   if (auto d = compare(then.tick, "X_WB", then.X_WB, now.X_WB)) return d;
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
+  if (auto d = compare(then.tick, "F_external", then.F_external, now.F_external)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
   for (const Compared& number : kNumbers) {
     const double a = number.of(then), b = number.of(now);
@@ -147,7 +156,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
 
 const char* compared_fields() {
   static const std::string names = [] {
-    std::string text = "X_WP, X_WQ, X_WB, eps, F_T, F_out";
+    std::string text = "X_WP, X_WQ, X_WB, eps, F_T, F_external, F_out";
     for (const Compared& number : kNumbers) text += std::string(", ") + number.name;
     return text;
   }();
@@ -190,6 +199,7 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& co
       loop.release(now);
     } else {
       loop.requests().request(then.commands);
+      if (then.external_expires_ns != 0) loop.requests().set_external_wrench(recorded_request(then));
       loop.tick(now, now);
     }
     TickRecord replayed;

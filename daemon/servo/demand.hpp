@@ -13,8 +13,9 @@ namespace wrenchd {
 ///
 /// In a tick without a usable sample the wrenches are those of the previous tick, and no work is done.
 struct Demand {
-  Wrench F_contact;  ///< Of contacts and local models.
-  Wrench F_weight;   ///< Holds the weight of the handle.
+  Wrench F_contact;   ///< Of contacts and local models.
+  Wrench F_weight;    ///< Holds the weight of the handle.
+  Wrench F_external;  ///< Of another program.
   DofMask undriven =
       kNoDof;  ///< Components of either that are left out because the device has no motors for them.
   Wrench F_T;  ///< Of the contact alone, about the origin and in the axes of the body frame T.
@@ -29,8 +30,10 @@ struct Demand {
       0.0;  ///< Work that fading contacts in or out did on the springs since the last tick.
   double obstacle_work_J =
       0.0;  ///< Work that moving obstacles did on the springs, negative if they took some.
-  double local_model_work_J = 0.0;     ///< Work that fading local models did on their springs.
-  double contact_gain = 1.0;           ///< Share of the contact wrench that the workspace lets through.
+  double local_model_work_J = 0.0;   ///< Work that fading local models did on their springs.
+  double external_declared_J = 0.0;  ///< Energy that the other program declared for its wrench in this tick.
+  bool external_active = false;      ///< Another program acts on the hand, or its wrench still fades.
+  double contact_gain = 1.0;         ///< Share of the contact wrench that the workspace lets through.
   double next_rendering_weight = 0.0;  ///< Share of the rendering that is being faded in.
   ContactState contact;                ///< The contact that the wrench is of.
 };

@@ -2,6 +2,7 @@
 #include "daemon/servo/output_stage.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/finite.hpp"
 
@@ -23,21 +24,32 @@ double share_of(const Wrench& sent, const Wrench& requested, double otherwise) n
   return any ? share : std::clamp(otherwise, 0.0, 1.0);
 }
 
+bool is_same(const Wrench& a, const Wrench& b) noexcept {
+  return a.force_N == b.force_N && a.torque_Nm == b.torque_Nm;
+}
+
 }  // namespace
 
 OutputStage::OutputStage(const LimitSettings& settings, const DeviceProfile& profile,
-                         const PassivityGuard& guard)
+                         const PassivityGuard& guard, const WorkAccount& account)
     : profile_(profile),
       settings_(settings),
       limits_(settings, profile),
       heat_(profile, limits_.max_force_N(), limits_.max_torque_Nm()),
-      stabilizer_(profile, guard) {}
+      stabilizer_(profile, guard),
+      account_(account) {}
 
 LimitSettings OutputStage::set_limits(const LimitSettings& limits, bool armed) noexcept {
   settings_ = armed ? tighter(settings_, limits, profile_) : limits;
   limits_.set_limits(settings_, profile_);
   heat_.set_maxima(limits_.max_force_N(), limits_.max_torque_Nm());
   return effective_limits();
+}
+
+void OutputStage::reset() noexcept {
+  limits_.reset();
+  account_.reset();
+  F_external_sent_ = Wrench{};
 }
 
 LimitSettings OutputStage::effective_limits() const noexcept {
@@ -54,6 +66,17 @@ Stabilized OutputStage::stabilize(const Demand& demand, const DeviceSample& samp
                                 demand.crossfade_work_J, demand.obstacle_work_J, demand.local_model_work_J});
 }
 
+/// While a sample is missing, the work since the last one is not known, and the next sample brings it.
+Wrench OutputStage::permitted_external(const Demand& demand, const DeviceSample& sample,
+                                       const TickTime& t) noexcept {
+  account_.deposit(demand.external_declared_J);
+  if (!demand.external_active) account_.close();
+  double dt_s = 0.0;
+  if (demand.sample_usable)
+    dt_s = sample.device_time_s - std::exchange(external_sample_time_s_, sample.device_time_s);
+  return account_.permit(demand.F_external, sample.X_BH, dt_s, t.dt_s);
+}
+
 Limited OutputStage::limit(const Stabilized& contact, const Demand& demand, const Authority& authority,
                            const DeviceSample& sample, const TickTime& t) noexcept {
   limits_.set_ceiling(heat_.force_ceiling_N(), heat_.torque_ceiling_Nm());
@@ -61,12 +84,20 @@ Limited OutputStage::limit(const Stabilized& contact, const Demand& demand, cons
     p_BH_m_ = sample.X_BH.translation_m;
     V_BH_ = sample.V_BH;
   }
-  Limited out = limits_.apply({contact.F + demand.F_weight, authority.scale, t.dt_s, V_BH_, p_BH_m_});
-  if (contact.intervened) out.causes |= kPassivity;
+  const Wrench F_external = permitted_external(demand, sample, t);
+  const Wrench F_own = contact.F + demand.F_weight;
+  const Wrench requested = demand.external_active ? F_own + F_external : F_own;
+  Limited out = limits_.apply({requested, authority.scale, t.dt_s, V_BH_, p_BH_m_});
+  if (contact.intervened || !is_same(F_external, demand.F_external)) out.causes |= kPassivity;
   if ((out.causes & kNotFinite) != 0) limits_.reset();
   heat_.advance(out.F, t.dt_s);
-  const Wrench F_contact = out.F - authority.scale * demand.F_weight;
   const bool motors_on = authority.send && authority.motors_on;
+  F_external_sent_ = Wrench{};
+  if (motors_on && demand.external_active)
+    F_external_sent_ = is_same(F_own, {}) ? out.F : share_of(out.F, requested, 0.0) * F_external;
+  account_.record_sent(F_external_sent_);
+  Wrench F_contact = out.F - authority.scale * demand.F_weight;
+  if (demand.external_active) F_contact = F_contact - F_external_sent_;
   contact_share_ = motors_on ? share_of(F_contact, demand.F_contact, authority.scale) : 0.0;
   if (authority.send) stabilizer_.record_sent(authority.motors_on ? F_contact : Wrench{});
   return out;

@@ -51,6 +51,7 @@ std::uint32_t Renderer::apply(const Requests& requests, const Verdict& verdict, 
     local_model_scale_ = stability_.max_stable_scale(local_models_.total_gains());
   }
   if (requests.limits) ++change_count_;
+  if (requests.external_wrench) external_wrench_.set(*requests.external_wrench);
   stability_.update_measurement(reading.sample, reading.last_command_sent, t.now);
   return change_count_;
 }
@@ -267,6 +268,7 @@ Demand Renderer::compute_wrench(const ContactState& contact, const DeviceSample&
   demand_.sample_usable = verdict.sample_usable;
   demand_.crossfade_work_J = demand_.obstacle_work_J = demand_.local_model_work_J = 0.0;
   if (verdict.sample_usable) recentred = compute_demand(sample, limits, t);
+  advance_external_wrench(t);
   demand_.contact_gain = contact_gain_;
   demand_.next_rendering_weight = crossfade_.next_weight();
   demand_.in_contact = crossfade_.in_contact() && contact_gain_ > 0.0;
@@ -318,6 +320,16 @@ Wrench Renderer::local_model_wrench(const DeviceSample& sample, const TickTime& 
       workspace_.X_WH(), workspace_.twist_in_world(sample.V_BH), t.now, t.dt_s, local_model_scale_);
   demand_.local_model_work_J = models.crossfade_work_J;
   return models.any_active ? workspace_.wrench_on_hand(models.F_H_W) : Wrench{};
+}
+
+/// In each tick, also without a usable sample: a wrench whose program has died must fade.
+void Renderer::advance_external_wrench(const TickTime& t) noexcept {
+  demand_.F_external = Wrench{};
+  const ExternalWrench::Evaluation external = external_wrench_.advance(t.now, t.dt_s);
+  demand_.external_declared_J = external.declared_J;
+  demand_.external_active = external.active && wrench_point_ == WrenchPoint::handle;
+  if (demand_.external_active)
+    demand_.F_external = restrict_to_dofs(workspace_.wrench_on_hand(external.F_H_W), driven_);
 }
 
 /// Ramps the share of the contact wrench that goes out, and recentres the workspace if that waits for it to

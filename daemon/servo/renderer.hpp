@@ -10,6 +10,7 @@
 #include "daemon/servo/demand.hpp"
 #include "daemon/servo/device_port.hpp"
 #include "daemon/servo/event.hpp"
+#include "daemon/servo/external_wrench.hpp"
 #include "daemon/servo/local_models.hpp"
 #include "daemon/servo/rendering_crossfade.hpp"
 #include "daemon/servo/request_inbox.hpp"
@@ -63,6 +64,7 @@ class Renderer {
   /// Share of the configured stiffness that stays passive.
   const StiffnessScale& stiffness_scale() const noexcept { return stability_.scale(); }
   PassivityGuard make_guard() const noexcept { return stability_.make_guard(); }
+  WorkAccount make_work_account() const noexcept { return stability_.make_work_account(); }
 
  private:
   bool follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept;
@@ -78,6 +80,7 @@ class Renderer {
   bool compute_demand(const DeviceSample& sample, const RenderingCrossfade::FadeLimits& limits,
                       const TickTime& t) noexcept;
   Wrench contact_wrench(const Rendering& rendering) const noexcept;
+  void advance_external_wrench(const TickTime& t) noexcept;
   Wrench local_model_wrench(const DeviceSample& sample, const TickTime& t) noexcept;
   CalmCondition calm_condition(const ContactState& contact, const DeviceSample& sample,
                                const RenderingCrossfade::FadeLimits& limits) const noexcept;
@@ -97,6 +100,7 @@ class Renderer {
   RenderingCrossfade crossfade_;
   Workspace workspace_;
   LocalModels local_models_;
+  ExternalWrench external_wrench_;
   double local_model_scale_ = 1.0;  ///< Share of the stiffness of the local models that stays passive.
   GravityCompensation gravity_;
   StabilityMonitor stability_;

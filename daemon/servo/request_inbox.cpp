@@ -15,7 +15,7 @@ std::optional<T> newest(LatestValue<T>& value) noexcept {
 
 Requests RequestInbox::take() noexcept {
   return {commands_.exchange(held_.load(std::memory_order_relaxed), std::memory_order_relaxed),
-          newest(workspace_), newest(local_models_), newest(limits_)};
+          newest(workspace_), newest(local_models_), newest(limits_), newest(external_wrench_)};
 }
 
 }  // namespace wrenchd

@@ -7,6 +7,7 @@
 #include "core/command.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
+#include "daemon/servo/external_wrench.hpp"
 #include "daemon/servo/local_models.hpp"
 #include "daemon/servo/rendering_exchange.hpp"
 #include "daemon/servo/workspace.hpp"
@@ -19,6 +20,7 @@ struct Requests {
   std::optional<WorkspaceRequest> workspace;
   std::optional<LocalModelSet> local_models;
   std::optional<LimitSettings> limits;
+  std::optional<ExternalWrenchRequest> external_wrench;
 };
 
 /// Where other threads put requests, and where each tick takes them. No thread ever waits: commands
@@ -64,6 +66,8 @@ class RequestInbox {
   void set_limits(const LimitSettings& limits) noexcept { limits_.write(limits); }
   /// Replaces the whole set of local models. Ignored by profiles whose wrench is not about the handle.
   void set_local_models(const LocalModelSet& models) noexcept { local_models_.write(models); }
+  /// Replaces the external wrench. Of two requests in one tick the older one is lost, with its energy.
+  void set_external_wrench(const ExternalWrenchRequest& request) noexcept { external_wrench_.write(request); }
   /// Where another rendering is offered; the loop cross-fades to it.
   RenderingExchange& renderings() noexcept { return renderings_; }
 
@@ -76,6 +80,7 @@ class RequestInbox {
   LatestValue<WorkspaceRequest> workspace_;
   LatestValue<LocalModelSet> local_models_;
   LatestValue<LimitSettings> limits_;
+  LatestValue<ExternalWrenchRequest> external_wrench_;
   RenderingExchange renderings_;
 };
 

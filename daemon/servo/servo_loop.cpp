@@ -17,7 +17,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       clock_(clock, make_pace_watch(settings.servo)),
       port_(device),
       renderer_(settings, profile, std::move(rendering), requests_.renderings(), telemetry_.events()),
-      output_(settings.limits, profile, renderer_.make_guard()),
+      output_(settings.limits, profile, renderer_.make_guard(), renderer_.make_work_account()),
       supervisor_(settings, profile, output_.max_force_N(), output_.max_torque_Nm(), telemetry_.events()) {
   telemetry_.show_limits(output_.effective_limits());
 }
@@ -40,7 +40,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   clock_.lap(Stage::read);
 
   const Verdict v = supervisor_.judge(s, asked.commands, port_.last(), renderer_.proxy_valid(), t);
-  if (v.self_test_passed) output_.set_guard(renderer_.derive_stiffness(t));
+  if (v.self_test_passed) output_.set_guard(renderer_.derive_stiffness(t), renderer_.make_work_account());
   const std::uint32_t changes = renderer_.apply(asked, v, in, t);
   if (asked.limits) change_limits(*asked.limits, v.armed());
   if (v.release) return leave(t, asked, in, Written{}, {});
@@ -72,8 +72,8 @@ void ServoLoop::change_limits(const LimitSettings& limits, bool armed) noexcept 
 Fault ServoLoop::finish(const TickTime& t, const Requests& asked, std::uint32_t changes,
                         const DeviceReading& in, const Demand& d, const Authority& a, const Limited& out,
                         const Written& w, TimePoint ready) noexcept {
-  telemetry_.publish({t, in, d, a, w, asked.commands, out.causes, changes, ready, clock_.stage_ns(),
-                      renderer_.stiffness_scale(), output_.stabilizer()},
+  telemetry_.publish({t, in, d, a, w, asked, out.causes, changes, ready, clock_.stage_ns(),
+                      renderer_.stiffness_scale(), output_.stabilizer(), output_.external()},
                      supervisor_, renderer_.active());
   telemetry_.count_times(t, clock_.stage_ns(), clock_.elapsed());
   return supervisor_.changed_by();
@@ -95,10 +95,10 @@ Fault ServoLoop::leave(const TickTime& t, const Requests& asked, const DeviceRea
   released.result = last_write.result;
   forget_device();
   const Authority none;
-  telemetry_.publish({t, in, renderer_.current_demand(), none, released, asked.commands, kNotLimited,
-                      renderer_.change_count(), ready, clock_.stage_ns(), renderer_.stiffness_scale(),
-                      output_.stabilizer(), true},
-                     supervisor_, renderer_.active());
+  telemetry_.publish(
+      {t, in, renderer_.current_demand(), none, released, asked, kNotLimited, renderer_.change_count(), ready,
+       clock_.stage_ns(), renderer_.stiffness_scale(), output_.stabilizer(), output_.external(), true},
+      supervisor_, renderer_.active());
   return (supervisor_.faults() & bit(Fault::device_lost)) != 0 ? Fault::device_lost
                                                                : supervisor_.changed_by();
 }

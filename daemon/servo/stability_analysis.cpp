@@ -122,4 +122,13 @@ PassivityGuard StabilityAnalysis::make_passivity_guard(const LoopMeasurement& me
   return PassivityGuard(damping_, limits);
 }
 
+/// The longest lag, and one tick more for what an acknowledgement does not show.
+WorkAccount StabilityAnalysis::make_work_account(const LoopMeasurement& measured) const noexcept {
+  const double ticks = std::ceil(longest_lag_s(measured) / period_s_) + 1.0;
+  const auto max_ticks = static_cast<double>(WorkAccount::kMaxDelay_ticks);
+  return WorkAccount({is_finite(ticks) ? static_cast<std::size_t>(std::clamp(ticks, 1.0, max_ticks))
+                                       : WorkAccount::kMaxDelay_ticks,
+                      encoder_step_});
+}
+
 }  // namespace wrenchd

@@ -6,6 +6,7 @@
 #include "core/loop_measurement.hpp"
 #include "core/passivity.hpp"
 #include "core/stability_bound.hpp"
+#include "core/work_account.hpp"
 #include "daemon/servo/local_models.hpp"
 
 namespace wrenchd {
@@ -50,6 +51,8 @@ class StabilityAnalysis {
 
   /// Returns a passivity guard for this device and the measured delay. RT-safe.
   PassivityGuard make_passivity_guard(const LoopMeasurement& measured) const noexcept;
+  /// Returns an account for external wrenches, for this device and the measured delay. RT-safe.
+  WorkAccount make_work_account(const LoopMeasurement& measured) const noexcept;
 
  private:
   StiffnessScale compute_scale(const LoopDelay& loop, double workspace_scale) const;

@@ -36,6 +36,8 @@ class StabilityMonitor {
   }
   /// The guard for the device and delay of the last derive().
   PassivityGuard make_guard() const noexcept { return analysis_.make_passivity_guard(derivation_); }
+  /// The account of external wrenches for the device and delay of the last derive().
+  WorkAccount make_work_account() const noexcept { return analysis_.make_work_account(derivation_); }
 
   /// The spring at the handle in axes of H, with scale(), and the longest lag of its wrench [s].
   Matrix6d stiffness_at_handle() const noexcept {

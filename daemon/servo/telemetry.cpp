@@ -42,6 +42,14 @@ void record_sample(const DeviceReading& reading, TickRecord& record) noexcept {
   record.estimated_velocity_dofs = sample.estimated_velocity_dofs;
 }
 
+void record_external_request(const Requests& asked, TickRecord& record) noexcept {
+  if (!asked.external_wrench) return;
+  const ExternalWrenchRequest& request = *asked.external_wrench;
+  record.requested_external = numbers(request.F_H_W.force_N, request.F_H_W.torque_Nm);
+  record.external_energy_J = request.energy_J;
+  record.external_expires_ns = nanoseconds(request.expires);
+}
+
 void record_contact(const ContactState& contact, TickRecord& record) noexcept {
   record.X_WP = numbers_of(contact.X_WP);
   record.X_WQ.fill(kNotSet);
@@ -91,6 +99,8 @@ void record_output(const TickResult& tick, TickRecord& record) noexcept {
   record.energy_out_J = guard.energy_out_J();
   record.injected_J = guard.injected_J();
   record.limit_causes = tick.limit_causes;
+  record.F_external = numbers(tick.external.F.force_N, tick.external.F.torque_Nm);
+  record.external_balance_J = tick.external.balance_J;
   record.F_out = numbers(tick.written.F.force_N, tick.written.F.torque_Nm);
   record.motors_commanded = tick.written.sent && tick.written.motors_on ? 1 : 0;
   record.write_fault = tick.written.result;
@@ -105,9 +115,10 @@ TickRecord make_record(const TickResult& tick, const Supervisor& supervisor) noe
   record.suspended_ns = tick.time.suspended.count();
   record.wrench_ready_ns = nanoseconds(tick.wrench_ready);
   record.stage_ns = tick.stage_ns;
-  record.commands = tick.commands;
+  record.commands = tick.asked.commands;
   record.change_count = tick.change_count;
   record_sample(tick.reading, record);
+  record_external_request(tick.asked, record);
   record_demand(tick.demand, record);
   record_state(supervisor, record);
   record_output(tick, record);
@@ -139,7 +150,8 @@ void Telemetry::publish_release(TimePoint now, const Supervisor& supervisor, con
   record_.motors_commanded = 0;
   record_.authority = 0.0;
   record_.limit_causes = kNotLimited;
-  record_.F_out = {};
+  record_.F_out = record_.F_external = {};
+  record_.external_balance_J = 0.0;
   record_demand(demand, record_);
   record_state(supervisor, record_);
   emit_changes(supervisor, demand, now);

@@ -36,13 +36,14 @@ struct TickResult {
   const Demand& demand;
   const Authority& authority;
   const Written& written;
-  CommandSet commands = kNoCommand;
+  const Requests& asked;
   std::uint16_t limit_causes = kNotLimited;  ///< LimitCause bits.
   std::uint32_t change_count = 0;            ///< Changes made on request since the start.
   TimePoint wrench_ready{};                  ///< When the wrench was computed, before limits.
   StageTimes stage_ns{};
   const StiffnessScale& stiffness_scale;
   const ContactStabilizer& stabilizer;
+  const OutputStage::External& external;
   bool released = false;  ///< The hand was released in this tick.
 };
 

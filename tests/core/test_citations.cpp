@@ -204,7 +204,7 @@ class CitationCheck {
     if (numbers.empty()) report(at, "write Eq. (8) for an equation of the paper");
     for (const std::string& n : numbers)
       if (!method().of_paper.contains(n))
-        report(at, "core/METHOD.md, section 17, does not list Eq. (" + n + ")");
+        report(at, "core/METHOD.md, section 18, does not list Eq. (" + n + ")");
   }
 
   void check_section(std::size_t at) {

@@ -88,6 +88,14 @@ void Client::move_hand(const std::array<double, 3>& position_m,
                                  {"expires_s", 1e-3 * static_cast<double>(expires_after.count())}});
 }
 
+void Client::set_wrench(const std::array<double, 3>& force_N, const std::array<double, 3>& torque_Nm,
+                        double energy_J, std::chrono::milliseconds expires_after) {
+  connection_->call("wrench.set", {{"force_N", force_N},
+                                   {"torque_Nm", torque_Nm},
+                                   {"energy_J", energy_J},
+                                   {"expires_s", 1e-3 * static_cast<double>(expires_after.count())}});
+}
+
 std::string Client::state() {
   return connection_->call("status", json::object()).value("state", "unknown");
 }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include <catch2/catch.hpp>
@@ -54,6 +56,40 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
   const auto difference = replay(recording, plan);
   if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
   CHECK_FALSE(difference.has_value());
+}
+
+TEST_CASE("a replay applies external wrenches as the loop did", "[replay][external_wrench]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const RunConfig plan = shipped_config();
+  {
+    VirtualRuntime s(plan);
+    RunRecorder recorder(s.runtime, file);
+    s.runtime.loop().requests().arm();
+    for (int i = 0; i < 3000; ++i) {
+      const double expires_s = i < 2000 ? 0.05 : 0.005;
+      if (i % 7 == 0)
+        s.runtime.loop().requests().set_external_wrench(
+            {{{0.0, 0.5, 2.0 * std::sin(0.02 * i)}, {0.0, 0.01, 0.0}},
+             1e-3,
+             s.clock.now() + from_seconds(expires_s)});
+      s.tick();
+      recorder.append_new_ticks();
+    }
+    REQUIRE(recorder.is_complete());
+  }
+  Recording recording = read_recording(file);
+  const auto acted = std::count_if(recording.ticks.begin(), recording.ticks.end(),
+                                   [](const TickRecord& tick) { return tick.F_external[1] != 0.0; });
+  REQUIRE(acted > 500);
+  CHECK_FALSE(replay(recording, plan).has_value());
+  const auto later = std::find_if(recording.ticks.begin() + 1500, recording.ticks.end(),
+                                  [](const TickRecord& tick) { return tick.external_expires_ns != 0; });
+  later->external_energy_J *= 2.0;
+  const auto difference = replay(recording, plan);
+  REQUIRE(difference.has_value());
+  CHECK(difference->tick == later->tick);
+  CHECK(difference->field == "external_balance_J");
 }
 
 TEST_CASE("a replay applies friction as the loop did", "[replay][friction]") {

@@ -147,6 +147,13 @@ class Client:
         return self.call("hand.set", position_m=[float(x) for x in position_m],
                          rotation_vector_rad=[float(x) for x in rotation_vector_rad], expires_s=expires_s)
 
+    def set_wrench(self, force_N, torque_Nm=(0.0, 0.0, 0.0), energy_J=0.0, expires_s=0.1):
+        """Acts on the hand: force and torque about the handle point, in axes of the world. energy_J: that the wrench may give
+        to the hand from now on, beside what the hand gave to it. Call it again before it expires; then the wrench fades out
+        within 50 ms. Raises Rejected if a value exceeds its limit, or if another program acts on the hand."""
+        return self.call("wrench.set", force_N=[float(x) for x in force_N], torque_Nm=[float(x) for x in torque_Nm],
+                         energy_J=energy_J, expires_s=expires_s)
+
     # Events
 
     def subscribe(self, *names):
