@@ -28,7 +28,7 @@ std::shared_ptr<const LoadedMesh> load(const MeshObstacleSettings& obstacle, Mes
 }
 
 LoadedObstacle make(std::shared_ptr<const LoadedMesh> loaded, const MeshObstacleSettings& obstacle,
-                    double surface_tolerance_m, bool all_convex, MeshLoader& loader) {
+                    const SceneSettings& scene, bool all_convex, MeshLoader& loader) {
   LoadedObstacle loaded_obstacle;
   loaded_obstacle.loaded = std::move(loaded);
   loader.check_size(*loaded_obstacle.loaded, obstacle.scale, kPlausibleObstacleSize);
@@ -40,30 +40,51 @@ LoadedObstacle make(std::shared_ptr<const LoadedMesh> loaded, const MeshObstacle
     if (is_convex(mesh, hull)) loaded_obstacle.hull = std::move(hull);
   }
   for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
-  loaded_obstacle.bvh = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh, surface_tolerance_m);
+  loaded_obstacle.bvh = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh,
+                                         scene.surface_tolerance_m, {scene.smoothing_m});
   return loaded_obstacle;
+}
+
+std::shared_ptr<const MeshBvh> tool_surface(const ToolBody& tool, const SceneSettings& settings,
+                                            MeshLoader& loader) {
+  const bool touches_meshes = !settings.meshes.empty() || !settings.bodies.empty();
+  return loader.build_bvh(tool.mesh, tool.kind, settings.tool.mesh, settings.surface_tolerance_m,
+                          {settings.smoothing_m, touches_meshes ? Smoothing::kMaxTrianglesForMeshes
+                                                                : Smoothing::kMaxTrianglesForHalfSpaces});
+}
+
+/// The hull of the surface that contacts use, in T. Half-spaces touch the hull.
+ConvexBody hull_of(const MeshBvh& surface, const ToolSettings& tool, MeshLoader& loader) {
+  LoadedMesh mesh;
+  mesh.file = tool.mesh;
+  mesh.mesh = surface.surface.mesh();
+  ConvexBody hull = loader.hull(mesh);
+  hull.compute_derived_data();
+  return hull;
 }
 
 /// Loads tool and obstacles.
 Scene load_obstacles(const SceneSettings& settings, MeshLoader& loader) {
   ToolBody tool = load_tool(settings.tool, loader);
-  if (settings.meshes.empty()) return Scene(std::move(tool), settings.half_spaces);
+  const bool smooth = settings.smoothing_m > 0.0;
+  if (settings.meshes.empty() && !smooth) return Scene(std::move(tool), settings.half_spaces);
   require_size_for_contacts(tool.mesh, 1.0, settings.tool.mesh);
+  auto tool_mesh = tool_surface(tool, settings, loader);
+  if (smooth) tool.hull = hull_of(*tool_mesh, settings.tool, loader);
 
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
   const bool all_at_rest = std::none_of(
       settings.meshes.begin(), settings.meshes.end(),
       [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.scheduled; });
-  bool all_convex = all_at_rest && tool.kind == BodyKind::solid && settings.tool.parts.empty() &&
+  bool all_convex = all_at_rest && !smooth && tool.kind == BodyKind::solid && settings.tool.parts.empty() &&
                     is_convex(tool.mesh, tool.hull);
   std::map<std::pair<const LoadedMesh*, double>, LoadedObstacle> loaded_obstacles;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
     auto loaded = load(obstacle, loader);
     const auto [at, is_new] = loaded_obstacles.try_emplace({loaded.get(), obstacle.scale});
     LoadedObstacle& loaded_obstacle = at->second;
-    if (is_new)
-      loaded_obstacle = make(std::move(loaded), obstacle, settings.surface_tolerance_m, all_convex, loader);
+    if (is_new) loaded_obstacle = make(std::move(loaded), obstacle, settings, all_convex, loader);
     meshes.emplace_back(obstacle.name, loaded_obstacle.bvh, obstacle.X_WM, obstacle.motion,
                         obstacle.scheduled);
     all_convex = all_convex && loaded_obstacle.hull;
@@ -73,7 +94,6 @@ Scene load_obstacles(const SceneSettings& settings, MeshLoader& loader) {
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
   if (!all_convex) convex.clear();
-  auto tool_mesh = loader.build_bvh(tool.mesh, tool.kind, settings.tool.mesh, settings.surface_tolerance_m);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
 }
@@ -85,12 +105,10 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   if (!obstacles.tool_mesh()) {
     require_size_for_contacts(obstacles.tool().mesh, 1.0, settings.tool.mesh);
     obstacles = Scene(obstacles.tool(), obstacles.half_spaces(), {}, {},
-                      loader.build_bvh(obstacles.tool().mesh, obstacles.tool().kind, settings.tool.mesh,
-                                       settings.surface_tolerance_m));
+                      tool_surface(obstacles.tool(), settings, loader));
   }
   std::vector<FreeBody> bodies;
-  for (const BodySettings& body : settings.bodies)
-    bodies.push_back(load_free_body(body, settings.surface_tolerance_m, loader));
+  for (const BodySettings& body : settings.bodies) bodies.push_back(load_free_body(body, settings, loader));
   return {obstacles, placed(std::move(bodies), obstacles, loader), settings.gravity_W_m_per_s2};
 }
 

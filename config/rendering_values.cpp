@@ -59,6 +59,7 @@ const std::array kValues = {
                      return std::string(s.rendering.contacts == ContactBackend::native ? "native" : "cgal");
                    },
                    used},
+    RenderingValue{"rendering.smoothing_m", [](const Settings& s) -> Value { return s.rendering.smoothing_m; }, used},
     RenderingValue{"rendering.friction.static",
                    [](const Settings& s) -> Value { return s.rendering.friction.static_coefficient; }, used},
     RenderingValue{"rendering.friction.dynamic",

@@ -210,6 +210,7 @@ constexpr std::array kTable = {
     WRENCHD_INTEGER("rendering", "planes", new_rendering, rendering.planes, 1, 1000),
     WRENCHD_SETTING("rendering", "contacts", "", new_rendering, rendering.contacts,
                     value.choice(out, {{"native", ContactBackend::native}, {"cgal", ContactBackend::cgal}})),
+    WRENCHD_NUMBER("rendering", "smoothing_m", new_rendering, rendering.smoothing_m, 0, 1e-3),
     WRENCHD_SETTING("rendering.friction", "static", "", new_rendering, rendering.friction.static_coefficient,
                     value.number(out, kCoefficient)),
     WRENCHD_SETTING("rendering.friction", "dynamic", "", new_rendering, rendering.friction.dynamic_coefficient,
@@ -322,6 +323,8 @@ void check_rendering(const SectionValues& values, Settings& settings) {
   if (settings.rendering.contacts == ContactBackend::cgal && settings.rendering.method != Method::exact)
     values.value("contacts")
         .reject("only method = \"exact\" detects contacts with CGAL; choose it, or leave contacts out");
+  if (settings.rendering.smoothing_m > 0.0 && settings.rendering.method != Method::exact)
+    values.value("smoothing_m").reject("only method = \"exact\" uses smoothed surfaces; choose it, or leave smoothing_m out");
 }
 
 struct Section {

@@ -36,6 +36,7 @@ struct RenderingSettings {
   Method method = Method::exact;
   int planes = 47;  ///< number of planes N_delta of Eq. (40), for method = "planar"
   ContactBackend contacts = ContactBackend::native;  ///< contact detection between meshes
+  double smoothing_m = 0.0;                          ///< for method = "exact": SceneSettings::smoothing_m
   FrictionSettings friction;                         ///< friction, for method = "exact"
   GraspStrength grasp;                               ///< for scenes with free bodies
 };

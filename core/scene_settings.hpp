@@ -96,6 +96,9 @@ struct SceneSettings {
   /// Contacts may use a surface that encloses a solid and lies at most this far outside of it [m]; 0: the
   /// mesh as loaded. Rounding of single precision may raise it (collision/meshes/mesh_simplifier.hpp).
   double surface_tolerance_m = 1e-6;
+  /// Contacts use curved surfaces through the vertices of the meshes, at most this far from their faces [m];
+  /// 0: the faces (collision/meshes/mesh_smoother.hpp). Not a key of the scene but of [rendering].
+  double smoothing_m = 0.0;
   std::string text = {};  ///< content of the source file as it was read; empty: not from a file
 };
 

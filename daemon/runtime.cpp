@@ -57,6 +57,7 @@ RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search)
   config.simulated =
       files.simulate || (!config.profile.name.empty() && config.profile.transport == Transport::loopback);
   config.scene = load_scene(config.settings.scene);
+  config.scene.smoothing_m = config.settings.rendering.smoothing_m;
   if (SimulationSettings& simulation = config.settings.simulation; !simulation.playback.empty())
     simulation.playback_path = read_playback(simulation.playback);
   return config;

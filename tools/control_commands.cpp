@@ -103,8 +103,14 @@ std::string status_text(const Json& s) {
     text += fmt::format(", scaled to {:.0f} % because the device has no watchdog", 100.0 * authority);
   text += fmt::format("\nstiffness  {:.0f} % of the configured value\n",
                       100.0 * s["stiffness_scale"].get<double>());
-  text += fmt::format("scene      {}, {} obstacles\n", s["scene"]["file"].get<std::string>(),
-                      s["scene"]["obstacles"].get<std::uint64_t>());
+  const Json& scene = s["scene"];
+  text += fmt::format("scene      {}, {} obstacles", scene["file"].get<std::string>(),
+                      scene["obstacles"].get<std::uint64_t>());
+  if (const auto bodies = scene.value("bodies", std::uint64_t{0}); bodies > 0)
+    text += fmt::format(", {} free {}", bodies, bodies == 1 ? "body" : "bodies");
+  if (const auto held = scene.find("held_body"); held != scene.end() && held->is_string())
+    text += fmt::format("; the tool holds '{}'", held->get<std::string>());
+  text += '\n';
   text += fmt::format("ticks      {} at {:g} Hz, {} late, {} skipped\n", s["tick"].get<std::uint64_t>(),
                       s["rates"]["rate_Hz"].get<double>(), timing["overruns"].get<std::uint64_t>(),
                       timing["skipped_ticks"].get<std::uint64_t>());

@@ -7,7 +7,7 @@
 
 namespace wrenchd {
 
-FreeBody load_free_body(const BodySettings& settings, double surface_tolerance_m, MeshLoader& loader) {
+FreeBody load_free_body(const BodySettings& settings, const SceneSettings& scene, MeshLoader& loader) {
   FreeBody out;
   out.name = settings.name;
   out.body = load_tool(settings.shape, loader);
@@ -18,7 +18,8 @@ FreeBody load_free_body(const BodySettings& settings, double surface_tolerance_m
     M.H_kg_m2 *= mass_kg / M.mass_kg;
     M.mass_kg = mass_kg;
   }
-  out.mesh = loader.build_bvh(out.body.mesh, out.body.kind, settings.shape.mesh, surface_tolerance_m);
+  out.mesh = loader.build_bvh(out.body.mesh, out.body.kind, settings.shape.mesh, scene.surface_tolerance_m,
+                              {scene.smoothing_m});
   out.motion.X_WB = settings.X_WM * out.body.X_MT();
   out.motion.velocity_W_m_per_s = settings.velocity_m_per_s;
   set_angular_velocity_W(M, settings.spin_rad_per_s, out.motion);

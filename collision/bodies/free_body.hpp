@@ -24,8 +24,8 @@ struct FreeBody {
   std::shared_ptr<const MeshBvh> mesh = {};  ///< of body.mesh, for contacts; null: built where it is needed
 };
 
-/// Loads and checks the mesh of a body. Throws MeshError that names the file, the defect, its place and the
-/// remedy. Not RT-safe: reads a file, may take seconds.
-FreeBody load_free_body(const BodySettings& settings, double surface_tolerance_m, MeshLoader& loader);
+/// Loads and checks the mesh of a body of the scene. Throws MeshError that names the file, the defect, its
+/// place and the remedy. Not RT-safe: reads a file, may take seconds.
+FreeBody load_free_body(const BodySettings& settings, const SceneSettings& scene, MeshLoader& loader);
 
 }  // namespace wrenchd

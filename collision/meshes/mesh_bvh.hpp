@@ -18,9 +18,9 @@ struct MeshBvh {
   MeshBvh() = default;  ///< empty; the mesh cache fills it through visit_members()
   explicit MeshBvh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)
       : surface(std::move(mesh), kind), bvh(surface) {}
-  /// Uses the simplified mesh of a solid for contacts. loaded_: the mesh that was simplified.
-  MeshBvh(SimplifiedMesh simplified, TriangleMesh loaded_)
-      : surface(std::move(simplified.mesh), MeshSurface::Kind::solid),
+  /// Uses another mesh for contacts than the loaded one. loaded_: the mesh that was simplified or smoothed.
+  MeshBvh(SimplifiedMesh simplified, TriangleMesh loaded_, MeshSurface::Kind kind = MeshSurface::Kind::solid)
+      : surface(std::move(simplified.mesh), kind),
         bvh(surface),
         surface_tolerance_m(simplified.distance_m),
         loaded(std::move(loaded_)),

@@ -41,6 +41,17 @@ std::string_view body_kind_name(BodyKind kind) {
   return kind == BodyKind::solid ? "solid" : "surface";
 }
 
+/// Smooths a simplified mesh, or the loaded mesh if it was not simplified. Numbers of vertices and triangles
+/// remain those of the loaded mesh.
+SimplifiedMesh smoothed(SimplifiedMesh simplified, const TriangleMesh& loaded, const Smoothing& smoothing) {
+  if (simplified.mesh.triangles.empty()) return smoothed(loaded, smoothing);
+  SimplifiedMesh out = smoothed(simplified.mesh, smoothing);
+  for (std::uint32_t& vertex : out.source_vertex) vertex = simplified.source_vertex[vertex];
+  for (std::uint32_t& triangle : out.source_triangle) triangle = simplified.source_triangle[triangle];
+  out.distance_m += simplified.distance_m;
+  return out;
+}
+
 template <class Use>
 void visit_parts(LoadedMesh& loaded, const Use& use) {
   use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.repairs), use(loaded.parts_overlap);
@@ -322,26 +333,38 @@ ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {
 
 std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind kind,
                                                      const std::filesystem::path& file,
-                                                     double surface_tolerance_m) {
+                                                     double surface_tolerance_m, const Smoothing& smoothing) {
   const std::size_t triangles = mesh.triangles.size();
   const double tolerance_m =
       kind == BodyKind::solid ? simplification_tolerance_m(mesh, surface_tolerance_m) : 0.0;
-  const std::string_view tolerance_bytes(reinterpret_cast<const char*>(&tolerance_m), sizeof tolerance_m);
-  const std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), tolerance_bytes,
-                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
-  auto bvh =
-      std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
-        if (tolerance_m > 0.0) {
-          report_progress(file, triangles, "finding its contact surface");
-          SimplifiedMesh simplified = simplify_enclosing(mesh, tolerance_m);
-          if (simplified.mesh.triangles.size() < triangles || simplified.distance_m > 0.0)
-            return MeshBvh(std::move(simplified), mesh);
-        }
-        report_progress(file, triangles, "finding its edges and building its BVH");
-        return MeshBvh(mesh, kind);
-      }));
+  const auto bytes = [](const auto& x) {
+    return std::string_view(reinterpret_cast<const char*>(&x), sizeof x);
+  };
+  std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), bytes(tolerance_m),
+                                             bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  const bool smooth = smoothing.most_m > 0.0;
+  if (smooth) made_from.insert(made_from.end(), {bytes(smoothing.most_m), bytes(smoothing.max_triangles)});
+  const bool large = triangles >= kLargeMeshTriangles || smooth;
+  auto bvh = std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, large, [&] {
+    SimplifiedMesh surface;
+    if (tolerance_m > 0.0) {
+      report_progress(file, triangles, "finding its contact surface");
+      surface = simplify_enclosing(mesh, tolerance_m);
+    }
+    if (smooth) surface = smoothed(std::move(surface), mesh, smoothing);
+    report_progress(file, std::max(triangles, surface.mesh.triangles.size()),
+                    "finding its edges and building its BVH");
+    const bool changed = surface.distance_m > 0.0 || surface.mesh.triangles.size() < triangles;
+    if (surface.mesh.triangles.empty() || !changed) return MeshBvh(mesh, kind);
+    return MeshBvh(std::move(surface), mesh, kind);
+  }));
   const std::size_t used = bvh->surface.triangles().size();
-  if (used < triangles || bvh->surface_tolerance_m > 0.0)
+  if (used > triangles)
+    add_once(simplifications_, file.string() + ": contacts use a smoothed surface of " +
+                                   with_thousands_separators(used) + " triangles in place of " +
+                                   with_thousands_separators(triangles) + ", " +
+                                   bound_text(bvh->surface_tolerance_m) + " away from them");
+  else if (used < triangles || bvh->surface_tolerance_m > 0.0)
     add_once(simplifications_, file.string() + ": contacts use an enclosing surface of " +
                                    contact_surface_text(used, triangles, bvh->surface_tolerance_m));
   return bvh;

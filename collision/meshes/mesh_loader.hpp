@@ -16,6 +16,7 @@
 #include "collision/meshes/mesh_bvh.hpp"
 #include "collision/meshes/mesh_cache.hpp"
 #include "collision/meshes/mesh_size.hpp"
+#include "collision/meshes/mesh_smoother.hpp"
 #include "core/convex_body.hpp"
 #include "core/files/opened_file.hpp"
 #include "core/triangle_mesh.hpp"
@@ -94,9 +95,11 @@ class MeshLoader {
   ConvexBody hull(const LoadedMesh& loaded);
 
   /// Returns the surface for contacts and its BVH. mesh: the mesh of `file`, placed and scaled. A solid is
-  /// simplified within surface_tolerance_m [m] (mesh_simplifier.hpp); 0: not at all.
+  /// simplified within surface_tolerance_m [m] (mesh_simplifier.hpp); 0: not at all. Then its curved parts
+  /// are smoothed (mesh_smoother.hpp).
   std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind,
-                                           const std::filesystem::path& file, double surface_tolerance_m);
+                                           const std::filesystem::path& file, double surface_tolerance_m,
+                                           const Smoothing& smoothing = {});
 
   /// Adds a text to changes() once.
   void add_change(const std::string& change);

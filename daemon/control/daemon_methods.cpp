@@ -319,6 +319,12 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
       }});
 }
 
+/// Returns the name of the body that the tool holds; null if it holds none.
+Json held_body(const SceneSettings& scene, std::uint32_t number) {
+  if (number == 0 || number > scene.bodies.size()) return nullptr;
+  return scene.bodies[number - 1].name;
+}
+
 }  // namespace
 
 Json status_json(const DaemonContext& context) {
@@ -339,6 +345,7 @@ Json status_json(const DaemonContext& context) {
                   {{"file", scene->settings.file.string()},
                    {"obstacles", scene->settings.half_spaces.size() + scene->settings.meshes.size()},
                    {"bodies", scene->settings.bodies.size()},
+                   {"held_body", held_body(scene->settings, now.held_body)},
                    {"rendering_id", scene->rendering_id}}},
                  {"rates", {{"rate_Hz", config.settings.servo.rate_Hz}}},
                  {"limits", limits_json(config, loop.telemetry().limits())},

@@ -40,6 +40,8 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
     snapshot.last_fault = raised->fault;
     snapshot.last_fault_at = event.at;
   }
+  if (const auto* grasped = std::get_if<Event::Grasped>(&event.data)) snapshot.held_body = grasped->body;
+  if (std::holds_alternative<Event::LetGo>(event.data)) snapshot.held_body = 0;
   if (const auto* stiffness = std::get_if<Event::StiffnessScaled>(&event.data))
     snapshot.stiffness_scale = stiffness->scale;
   if (description.name == "proxy_initialization" &&

@@ -38,6 +38,7 @@ struct FeedSnapshot {
   Fault last_fault = Fault::none;  ///< newest fault that changed the state; none: there was no such fault
   TimePoint last_fault_at{};       ///< when last_fault was raised
   std::string proxy_initialization = "unknown";  ///< "searching", "found" or "failed"
+  std::uint32_t held_body = 0;                   ///< number of the body that the tool holds, from 1; 0: none
   double stiffness_scale = 1.0;                  ///< stable fraction of the configured stiffness, 0 to 1
 };
 

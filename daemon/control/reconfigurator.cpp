@@ -190,6 +190,7 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
 void Reconfigurator::replace_scene(const std::filesystem::path& file, const FileScope& scope) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = load_scene(file, scope);
+  scene.smoothing_m = config_.settings.rendering.smoothing_m;
   std::string text = scene.text;
   check_scene_cost(scene, config_.scene);
   BuiltScene built = build_starting_scene(scene, scope);
@@ -297,8 +298,15 @@ std::vector<ChangedValue> Reconfigurator::set_rendering(const TomlNode& changes,
   Settings settings = config_.settings;
   change_rendering(changes, source, settings);
   std::vector<ChangedValue> changed = changed_values(config_.settings, settings);
-  auto rendering = build_rendering(settings, scene_);
-  offer(std::move(rendering), settings, config_.scene, present_scene()->text, {scene_, {}, loaded_});
+  SceneSettings scene = config_.scene;
+  BuiltScene built = {scene_, {}, loaded_};
+  if (scene.smoothing_m != settings.rendering.smoothing_m) {
+    scene.smoothing_m = settings.rendering.smoothing_m;
+    keep_bodies(scene);
+    built = build_scene(scene, *loaded_, FileScope());
+  }
+  auto rendering = build_rendering(settings, built.scene);
+  offer(std::move(rendering), settings, std::move(scene), present_scene()->text, std::move(built));
   return changed;
 }
 
@@ -409,11 +417,20 @@ bool Reconfigurator::is_profile_changed(const RunConfig& config) const {
          config.profile_texts.front().text != profile_text_;
 }
 
-/// Builds the scene if its name or one of its files has changed since the last reload.
+/// Builds the scene if its name or one of its files has changed since the last reload, or the smoothing of
+/// its surfaces changes.
 Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& scene) {
   std::string fingerprint = files_fingerprint(scene);
-  if (fingerprint == scene_fingerprint_)
-    return {false, std::move(fingerprint), config_.scene, present_scene()->text, {scene_, {}, loaded_}};
+  if (fingerprint == scene_fingerprint_) {
+    SceneSettings settings = config_.scene;
+    if (settings.smoothing_m == scene.smoothing_m)
+      return {
+          false, std::move(fingerprint), std::move(settings), present_scene()->text, {scene_, {}, loaded_}};
+    settings.smoothing_m = scene.smoothing_m;
+    keep_bodies(settings);
+    BuiltScene built = build_scene(settings, *loaded_, FileScope());
+    return {false, std::move(fingerprint), std::move(settings), present_scene()->text, std::move(built)};
+  }
   SceneSettings settings = scene;
   std::string text = scene.text;
   BuiltScene built = build_starting_scene(settings, FileScope());
@@ -424,7 +441,9 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const std::lock_guard lock(mutex_);
   const RunConfig config = read();
   ReloadedSettings settings = reload_settings(config.settings);
-  ReloadedScene scene = reload_scene(config.scene);
+  SceneSettings new_scene = config.scene;
+  new_scene.smoothing_m = settings.present.rendering.smoothing_m;
+  ReloadedScene scene = reload_scene(new_scene);
   if (is_profile_changed(config))
     settings.not_applied.emplace_back("the device profile was changed: requires a restart");
   if (scene.changed) {

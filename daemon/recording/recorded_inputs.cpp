@@ -222,6 +222,7 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   set(simulation, "playback", "");
   set(table_in(tree, "servo"), "realtime", header.realtime.empty() ? "required" : header.realtime);
   config.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
+  config.scene.smoothing_m = config.settings.rendering.smoothing_m;
   config.simulated = config.profile.transport == Transport::loopback;
   return config;
 }

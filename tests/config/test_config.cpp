@@ -56,7 +56,8 @@ std::string printed(const Settings& s) {
   out << s.servo.rate_Hz << ' ' << int(s.servo.pacing) << int(s.servo.realtime) << ' ' << s.servo.priority
       << ' ' << s.servo.cpu << ' ' << s.servo.late_limit_s << '\n'
       << int(s.rendering.method) << ' ' << s.rendering.planes << ' ' << int(s.rendering.contacts) << ' '
-      << s.rendering.friction.static_coefficient << ' ' << s.rendering.friction.dynamic_coefficient << '\n'
+      << s.rendering.smoothing_m << ' ' << s.rendering.friction.static_coefficient << ' '
+      << s.rendering.friction.dynamic_coefficient << '\n'
       << s.rendering.grasp.force_N << ' ' << s.rendering.grasp.torque_Nm << '\n'
       << static_cast<int>(s.wrench.law) << ' ' << s.wrench.energy_stiffness_per_s2 << '\n'
       << s.wrench.gains.stiffness << '\n'
@@ -134,7 +135,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 64);
+  CHECK(options == 65);
 }
 
 TEST_CASE("every shipped file is valid", "[config]") {

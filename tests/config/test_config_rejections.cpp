@@ -154,6 +154,13 @@ TEST_CASE("invalid settings are rejected with location and remedy", "[config]") 
       {"[rendering]\nmethod = 'planar'\ncontacts = 'cgal'", "3:12",
        "key 'rendering.contacts': only method = \"exact\" detects contacts with CGAL; choose it, or leave "
        "contacts out"},
+      {"[rendering]\nsmoothing_m = 0.01", "2:15",
+       "key 'rendering.smoothing_m': expected a number from 0 to 0.001"},
+      {"[rendering]\nsmoothing = 0.0001", "2:1",
+       "key 'rendering.smoothing' is not known; give it in m as 'smoothing_m'"},
+      {"[rendering]\nmethod = 'planar'\nsmoothing_m = 0.0001", "3:15",
+       "key 'rendering.smoothing_m': only method = \"exact\" uses smoothed surfaces; choose it, or leave "
+       "smoothing_m out"},
       {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",

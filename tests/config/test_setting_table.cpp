@@ -78,7 +78,7 @@ TEST_CASE("each number of the configuration reaches its member", "[settings]") {
     // A nearby value in the range; integers stay integers.
     const double old = setting.number(defaults);
     bool reached = false;
-    for (const double value : {old + 1.0, old - 1.0, 1.01 * old, 0.99 * old, 0.5}) {
+    for (const double value : {old + 1.0, old - 1.0, 1.01 * old, 0.99 * old, 0.5, 0.0005}) {
       if (value == old) continue;
       const std::string text = "[" + std::string(setting.section) + "]\n" + std::string(setting.key) + " = " +
                                to_text(value) + "\n";

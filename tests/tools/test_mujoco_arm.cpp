@@ -59,12 +59,13 @@ TEST_CASE("a robot arm in MuJoCo acts on the hand, and its death in contact leav
   const auto last_request = std::find_if(
       ticks.rbegin(), ticks.rend(), [](const TickRecord& tick) { return tick.external_expires_ns != 0; });
   REQUIRE(last_request != ticks.rend());
-  const std::int64_t over_ns = last_request->external_expires_ns + 60'000'000;
+  const std::int64_t expired_ns = last_request->external_expires_ns, over_ns = expired_ns + 60'000'000;
   double largest_step_N = 0.0, smallest_J = 0.0;
   for (auto tick = last_request.base(); tick != ticks.end(); ++tick) {
     if (tick->now_ns > over_ns) CHECK(force_N(tick->F_external) == 0.0);
     smallest_J = std::min(smallest_J, tick->external_balance_J);
     const TickRecord& before = *(tick - 1);
+    if (before.now_ns < expired_ns) continue;  // the wrench still follows the request
     if (tick->released != 0 || tick->state != before.state) continue;
     double step_N = 0.0;
     for (std::size_t i = 0; i < 3; ++i)

@@ -72,6 +72,18 @@ TEST_CASE("the status names the present scene", "[status]") {
   CHECK(r.status()["scene"]["rendering_id"] == r.s.last.rendering_id);
 }
 
+TEST_CASE("the status names the body that the tool holds", "[status]") {
+  Rig r;
+  CHECK(r.status()["scene"]["held_body"].is_null());
+  r.s.runtime.reconfigurator().replace_scene(test::source_path("config/scenes/push_the_box.toml"));
+  r.s.run(0.1);
+  const TimePoint now = r.s.clock.now();
+  r.s.runtime.loop().telemetry().events().emit(now, Event::Grasped{1});
+  CHECK(r.status()["scene"]["held_body"] == "box");
+  r.s.runtime.loop().telemetry().events().emit(now, Event::LetGo{1, false});
+  CHECK(r.status()["scene"]["held_body"].is_null());
+}
+
 TEST_CASE("the status has the last fault with the time of its tick", "[status]") {
   Rig r;
   CHECK(r.status()["last_fault"].is_null());

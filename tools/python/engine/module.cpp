@@ -167,6 +167,7 @@ class Engine {
           {given["name"].cast<std::string>(), normal_W / length, given["offset"].cast<double>() / length});
     }
     settings.surface_tolerance_m = options["surface_tolerance"].cast<double>();
+    settings.smoothing_m = options["smoothing"].cast<double>();
     solve_.depth.method = choice(kMethods, "method", options["method"].cast<std::string>());
     solve_.depth.planes = options["planes"].cast<int>();
     solve_.depth.friction.static_coefficient = options["friction"].cast<std::pair<double, double>>().first;

@@ -360,7 +360,8 @@ class Scene:
     """A tool and its obstacles. Raises MeshError or ValueError, which name the body, the defect and the cure.
 
     tool: Body or Mesh. obstacles: any of Body, Mesh and HalfSpace. surface_tolerance [m]: contacts may use a surface that
-    encloses a solid and lies at most this far outside of it; 0: the mesh as loaded. cache: directory for the results of large
+    encloses a solid and lies at most this far outside of it; 0: the mesh as loaded. smoothing [m]: contacts use curved surfaces
+    through the vertices of the meshes, at most this far from their faces; 0: the faces. cache: directory for the results of large
     meshes. method: "exact", "planar" (with planes), "descent" or "translational". friction: static and dynamic coefficient for
     follow(). contacts: "native" or "cgal". law: "pid" (Eq. (16) with K_P = k_p I), or "energy" (the gradient of (k/2) T with
     k = energy_stiffness [1/s^2]).
@@ -370,13 +371,14 @@ class Scene:
     """
 
     def __init__(self, tool: Union[Body, Mesh], obstacles: Sequence[Union[Body, Mesh, HalfSpace]] = (), *,
-                 surface_tolerance: float = 1e-6, cache: Union[str, Path, None] = None, method: str = "exact",
+                 surface_tolerance: float = 1e-6, smoothing: float = 0.0, cache: Union[str, Path, None] = None, method: str = "exact",
                  planes: int = 47, friction: Tuple[float, float] = (0.0, 0.0), contacts: str = "native",
                  law: str = "pid", k_p: float = 1.0, energy_stiffness: float = 1.0) -> None:
         self._tool = Body(tool) if isinstance(tool, Mesh) else tool
         self._obstacles = tuple(Body(one) if isinstance(one, Mesh) else one for one in obstacles)
         self._options = {
             "surface_tolerance": _number(surface_tolerance, "surface_tolerance [m]", 0.0, 1.0),
+            "smoothing": _number(smoothing, "smoothing [m]", 0.0, 1e-3),
             "cache": "" if cache is None else str(cache), "method": method,
             "planes": int(_number(planes, "planes", 1, 1000)),
             "friction": (_number(friction[0], "friction: static coefficient", 0.0, 5.0),
