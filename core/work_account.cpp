@@ -59,14 +59,23 @@ void WorkAccount::record_sent(const Wrench& sent_B) noexcept {
                        change.torque_Nm.lpNorm<1>() * loop_.step.angular_rad);
 }
 
+std::size_t WorkAccount::window() const noexcept {
+  return std::min(loop_.delay_ticks + ticks_since_sample_, kHistory - 1);
+}
+
+void WorkAccount::close() noexcept {
+  for (std::size_t ago = 0; ago < window(); ++ago)
+    if (!sent(ago).force_N.isZero(0.0) || !sent(ago).torque_Nm.isZero(0.0)) return;
+  balance_J_ = std::min(balance_J_, 0.0);
+}
+
 /// METHOD (117): the most that any wrench which may have acted since the previous sample can have given.
 double WorkAccount::work_bound_J(const Motion& step) const noexcept {
-  const std::size_t window = std::min(loop_.delay_ticks + ticks_since_sample_, kHistory - 1);
   const auto work = [&](const Wrench& F) {
     return F.force_N.dot(step.displacement_m) + F.torque_Nm.dot(step.rotation_rad);
   };
   double most_J = work(sent(0));
-  for (std::size_t ago = 1; ago < window; ++ago) most_J = std::max(most_J, work(sent(ago)));
+  for (std::size_t ago = 1; ago < window(); ++ago) most_J = std::max(most_J, work(sent(ago)));
   return most_J;
 }
 

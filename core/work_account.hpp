@@ -48,8 +48,9 @@ class WorkAccount {
   /// permit() was sent.
   void record_sent(const Wrench& sent_B) noexcept;
 
-  /// The wrench has ended: what is left of the balance is lost. A debt stays.
-  void close() noexcept { balance_J_ = balance_J_ < 0.0 ? balance_J_ : 0.0; }
+  /// The wrench has ended: what is left of the balance is lost, as soon as no wrench is under way. Call it in
+  /// each tick without a wrench. A debt stays.
+  void close() noexcept;
   /// The device is another one: forgets samples, wrenches and balance.
   void reset() noexcept;
 
@@ -64,6 +65,8 @@ class WorkAccount {
     Vector3d rotation_rad = Vector3d::Zero();
   };
   const Wrench& sent(std::size_t ticks_ago) const noexcept { return sent_[(tick_ - ticks_ago) % kHistory]; }
+  /// Number of wrenches that may have acted since the previous sample.
+  std::size_t window() const noexcept;
   double work_bound_J(const Motion& step) const noexcept;
   double reserve_J(const Wrench& F, double tick_s) const noexcept;
 

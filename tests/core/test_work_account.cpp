@@ -199,6 +199,19 @@ TEST_CASE("without energy an external wrench falls smoothly to zero", "[work_acc
   CHECK(largest_step_N < 0.25);
 }
 
+TEST_CASE("the balance pays for wrenches that are under way when the request ends", "[work_account]") {
+  WorkAccount account({3, {}});
+  account.deposit(0.5);
+  account.permit({}, at({0, 0, 0}), 0.0, kTick_s);
+  account.permit(force(2.0), at({0, 0, 0}), kTick_s, kTick_s);
+  for (int k = 1; k <= 8; ++k) {
+    account.permit({}, at({1e-4 * k, 0, 0}), kTick_s, kTick_s);
+    account.close();
+    CHECK(account.balance_J() >= 0.0);
+  }
+  CHECK(account.balance_J() == 0.0);
+}
+
 TEST_CASE("an account ends with its wrench, and a debt stays", "[work_account]") {
   WorkAccount account({2, {}});
   account.deposit(0.3);
