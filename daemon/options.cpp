@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/guide_line.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/version.hpp"
@@ -119,13 +120,12 @@ void add_options(CLI::App& app, Options& options) {
   app.description(
       "wrenchd: a haptic servo daemon. It reads the pose of the device, computes the generalized\n"
       "penetration depth of the tool in its scene, and writes the wrench to the device.");
-  app.footer(
+  app.footer(with_guide_line(
       "Signals: SIGHUP reads the configuration again and applies all of it, or nothing if it has an error;\n"
       "SIGUSR1 is an emergency stop; SIGUSR2 acknowledges a stop or a fault. After both the loop is "
       "disarmed.\n"
       "Exit codes: 0 stopped on request; 1 rejected (file, device, kernel); 3 ended with a fault that no\n"
-      "client acknowledged; others: usage. Every exit releases the hand: zero wrench, motors off.\n"
-      "Guides: /usr/share/doc/wrenchd, or README.md of the source tree.");
+      "client acknowledged; others: usage. Every exit releases the hand: zero wrench, motors off."));
   app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
   add_file_options(app, options);
   add_device_options(app, options);

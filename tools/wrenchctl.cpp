@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/command_line.hpp"
+#include "daemon/guide_line.hpp"
 #include "daemon/standard_streams.hpp"
 #include "daemon/version.hpp"
 #include "tools/commands/subcommand.hpp"
@@ -47,13 +48,12 @@ int main(int argc, char** argv) {
   if (!open_standard_streams()) return 1;  // else a file that is opened gets the number of a closed stream
   CLI::App app("wrenchctl: controls wrenchd, checks its input files, and computes projections and wrenches.");
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
-  app.footer(
+  app.footer(with_guide_line(
       "Commands for a running daemon use the socket of --socket; without it, the first of $WRENCHD_SOCKET,\n"
       "/run/wrenchd/control.sock and $XDG_RUNTIME_DIR/wrenchd/control.sock.\n"
       "Exit codes: 0 done; 1 rejected (standard error names the file, the location and the remedy);\n"
       "2 mesh: not a solid; 3 solve: no admissible pose was found near a pose; 4 replay: a tick differs;\n"
-      "5 doctor, conform: a check failed; over 100: invalid command line.\n"
-      "Guides: /usr/share/doc/wrenchd, or README.md of the source tree.");
+      "5 doctor, conform: a check failed; over 100: invalid command line."));
   app.require_subcommand(0, 1);  // optional, so that an unknown command appears by name in the error
   const auto commands = make_commands();
   for (const auto& command : commands) command->add_to(app);

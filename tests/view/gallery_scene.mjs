@@ -26,6 +26,11 @@ export async function shown(name, size, t_s = MOMENTS_s[name]) {
   const recording = file(`${name}.h5`);
   await finished("wrenchd", ["--config", `gallery/${name}.toml`, "--virtual-time", "--seconds", String(t_s + 0.05), "--arm",
     "--record", recording, "--control", "none"]);
+  return shownRecording(recording, size, t_s);
+}
+
+/** Opens a recording at this time; returns the page and its server. */
+export async function shownRecording(recording, size, t_s) {
   const server = await view([recording]);
   const page = await open(server.url, { viewport: size, colorScheme: "light" });
   await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));

@@ -4,6 +4,7 @@ import { Connection } from "./connection.js";
 import { ToolDrag } from "./drag.js";
 import { Drawer } from "./drawer.js";
 import { $ } from "./elements.js";
+import { GamepadDrag } from "./gamepad.js";
 import { showMeasure } from "./measure.js";
 import { Rows } from "./curve_data.js";
 import { Overview } from "./overview.js";
@@ -326,7 +327,10 @@ const connection = new Connection({
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
   reply({ request, accepted, error }) {
-    if (!accepted && request === "hand") toolDrag.end();
+    if (!accepted && request === "hand") {
+      toolDrag.end();
+      gamepadDrag.reject();
+    }
     if (!accepted && error !== "") toast(request === "lease" ? error : `${request}: ${error}`);
   },
   lost() {
@@ -341,10 +345,12 @@ const connection = new Connection({
 
 // --- buttons, keys and mouse ---
 
-const toolDrag = new ToolDrag(world, {
+const hand = {
   handPose: () => (mode === "live" && connected && link.status?.device.simulated ? frame?.hand ?? null : null),
   send: (goal) => connection.send("hand", goal),
-});
+};
+const toolDrag = new ToolDrag(world, hand);
+const gamepadDrag = new GamepadDrag(world, hand);
 
 const drawer = new Drawer({
   call: (method, params) => connection.call(method, params),
@@ -479,7 +485,7 @@ window.view = {
   page: () => page,
   world: () => world.inspect(),
   scale: () => world.scale(),
-  dragging: () => Boolean(toolDrag.drag),
+  dragging: () => Boolean(toolDrag.drag || gamepadDrag.drag),
   onScreen: (point) => world.onScreen(point),
   toolOnScreen: () => world.toolOnScreen(),
   history: () => plots.data()[0],
