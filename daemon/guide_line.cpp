@@ -21,7 +21,7 @@ fs::path share_of_program() {
 }  // namespace
 
 std::string guide_line(const fs::path& share, const fs::path& source) {
-  const fs::path installed = share / "doc/wrenchd/README.md";
+  const fs::path installed = share / "doc/wrenchd" / "README.md";
   const fs::path references = share / "doc/wrenchd-doc/reference/index.html";
   std::string line;
   if (is_file(installed)) {

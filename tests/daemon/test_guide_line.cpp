@@ -18,11 +18,11 @@ using Catch::EndsWith;
 TEST_CASE("the help names the guides and references that are installed", "[guide_line]") {
   const test::TemporaryDirectory directory;
   const fs::path share = directory.path() / "share", source = directory.path() / "source";
-  const fs::path installed = share / "doc/wrenchd/README.md";
+  const fs::path installed = share / "doc/wrenchd" / "README.md";
   const fs::path references = share / "doc/wrenchd-doc/reference/index.html";
   CHECK(guide_line(share, {}).empty());
   CHECK(guide_line(share, source).empty());
-  directory.write("source/README.md", "text");
+  directory.write(fs::path("source") / "README.md", "text");
   CHECK(guide_line(share, source) == "Guides: " + (source / "README.md").string());
   directory.write(references, "text");
   CHECK(guide_line(share, {}) == "References: " + references.string());

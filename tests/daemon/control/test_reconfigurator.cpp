@@ -200,6 +200,29 @@ TEST_CASE("the contact detection can be changed in contact", "[reconfigurator][c
   CHECK(s.inactive_ticks == 0);
 }
 
+TEST_CASE("surfaces can be smoothed in contact, and keep their facets again", "[reconfigurator]") {
+  Rig s;
+  s.reconfigurator().insert_obstacle(
+      toml("name = \"ball\"\nmesh = { make = \"sphere\", triangles = 500 }\nposition_m = [0.3, 0.0, 0.0]"),
+      "request");
+  s.press();
+  const auto triangles = [&] {
+    return s.reconfigurator().scene_view().scene->meshes().back().mesh->surface.triangles().size();
+  };
+  const std::size_t facets = triangles();
+  s.reconfigurator().set_rendering(toml("[rendering]\nsmoothing_m = 0.001"), "request");
+  s.go_for(1.0);
+  CHECK(triangles() > 20 * facets);
+  CHECK(s.reconfigurator().settings().rendering.smoothing_m == 0.001);
+  CHECK(s.force().z() > 1.0);
+  CHECK(s.max_step_N < 0.05);
+  s.reconfigurator().set_rendering(toml("[rendering]\nsmoothing_m = 0.0"), "request");
+  s.go_for(1.0);
+  CHECK(triangles() == facets);
+  CHECK(s.rendering_intact());
+  CHECK(s.inactive_ticks == 0);
+}
+
 TEST_CASE("a rejected change has no effect, and its message has the location and the remedy",
           "[reconfigurator]") {
   Rig s;

@@ -225,7 +225,8 @@ TEST_CASE("wrenchctl replays, exports and plots a recording of wrenchd", "[recor
   const ProgramResult replayed = run_program("wrenchctl", {"replay", file});
   INFO(replayed.out << replayed.err);
   CHECK(replayed.exit_code == 0);
-  CHECK(replayed.out.find("compared: X_WP, X_WQ, X_WB, eps, F_T, F_out, energy, ") != std::string::npos);
+  CHECK(replayed.out.find("compared: X_WP, X_WQ, X_WB, eps, F_T, F_external, F_out, energy, ") !=
+        std::string::npos);
   CHECK(replayed.out.find("6001 ticks, all bits are equal") != std::string::npos);
   const ProgramResult other = run_program(
       "wrenchctl", {"replay", file, "--scene", test::source_path("config/scenes/cube_over_plunger.toml")});
