@@ -48,33 +48,28 @@ TEST_CASE("a robot arm in MuJoCo acts on the hand, and its death in contact leav
   arm.signal(SIGKILL);
   std::this_thread::sleep_for(500ms);
   wrenchd.signal(SIGTERM);
-  CHECK(wrenchd.wait().exit_code == 0);
+  REQUIRE_RATE(load, wrenchd.wait().exit_code == 0);  // a loop that runs late ends with a fault
 
   const Recording recording = read_recording(recording_file);
   const std::vector<TickRecord>& ticks = recording.ticks;
   const auto pulls = [](const TickRecord& tick) { return force_N(tick.F_external) > 0.2; };
   REQUIRE_RATE(load, std::count_if(ticks.begin(), ticks.end(), pulls) > 500);
-  CHECK(std::any_of(ticks.begin(), ticks.end(),
-                    [&](const TickRecord& tick) { return pulls(tick) && tick.contacts > 0; }));
+  REQUIRE_RATE(load, std::any_of(ticks.begin(), ticks.end(),
+                                 [&](const TickRecord& tick) { return pulls(tick) && tick.contacts > 0; }));
 
   const auto last_request = std::find_if(
       ticks.rbegin(), ticks.rend(), [](const TickRecord& tick) { return tick.external_expires_ns != 0; });
   REQUIRE(last_request != ticks.rend());
-  const std::int64_t expired_ns = last_request->external_expires_ns, over_ns = expired_ns + 60'000'000;
-  double largest_step_N = 0.0, smallest_J = 0.0;
+  const std::int64_t expired_ns = last_request->external_expires_ns;
+  // The arm asks for 4 N at most. They fade within 50 ms; 10 ms more for ticks that come late.
+  double beyond_fade_N = 0.0, smallest_J = 0.0;
   for (auto tick = last_request.base(); tick != ticks.end(); ++tick) {
-    if (tick->now_ns > over_ns) CHECK(force_N(tick->F_external) == 0.0);
     smallest_J = std::min(smallest_J, tick->external_balance_J);
-    const TickRecord& before = *(tick - 1);
-    if (before.now_ns < expired_ns) continue;  // the wrench still follows the request
-    if (tick->released != 0 || tick->authority != before.authority) continue;
-    double step_N = 0.0;
-    for (std::size_t i = 0; i < 3; ++i)
-      step_N = std::hypot(step_N, tick->F_external[i] - before.F_external[i]);
-    largest_step_N = std::max(largest_step_N, step_N);
+    const double since_s = 1e-9 * static_cast<double>(tick->now_ns - expired_ns);
+    const double fade = std::clamp(1.0 - (since_s - 0.010) / 0.050, 0.0, 1.0);
+    beyond_fade_N = std::max(beyond_fade_N, force_N(tick->F_external) - 4.0 * fade);
   }
-  // 4 N fade within 50 ms, and a tick that comes late makes up for at most one other.
-  REQUIRE_RATE(load, largest_step_N <= 4.0 / 50.0 * 2.0 + 1e-9);
+  REQUIRE_RATE(load, beyond_fade_N <= 1e-9);
   CHECK(smallest_J > -1e-6);
 }
 
