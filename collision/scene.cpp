@@ -53,16 +53,6 @@ std::shared_ptr<const MeshBvh> tool_surface(const ToolBody& tool, const SceneSet
                                                                 : Smoothing::kMaxTrianglesForHalfSpaces});
 }
 
-/// The hull of the surface that contacts use, in T. Half-spaces touch the hull.
-ConvexBody hull_of(const MeshBvh& surface, const ToolSettings& tool, MeshLoader& loader) {
-  LoadedMesh mesh;
-  mesh.file = tool.mesh;
-  mesh.mesh = surface.surface.mesh();
-  ConvexBody hull = loader.hull(mesh);
-  hull.compute_derived_data();
-  return hull;
-}
-
 /// Loads tool and obstacles.
 Scene load_obstacles(const SceneSettings& settings, MeshLoader& loader) {
   ToolBody tool = load_tool(settings.tool, loader);
@@ -70,7 +60,7 @@ Scene load_obstacles(const SceneSettings& settings, MeshLoader& loader) {
   if (settings.meshes.empty() && !smooth) return Scene(std::move(tool), settings.half_spaces);
   require_size_for_contacts(tool.mesh, 1.0, settings.tool.mesh);
   auto tool_mesh = tool_surface(tool, settings, loader);
-  if (smooth) tool.hull = hull_of(*tool_mesh, settings.tool, loader);
+  if (smooth) tool.hull = hull_of(*tool_mesh, settings.tool.mesh, loader);
 
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;

@@ -75,6 +75,15 @@ ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, const ToolSettings& setti
   return tool;
 }
 
+ConvexBody hull_of(const MeshBvh& surface, const std::filesystem::path& file, MeshLoader& loader) {
+  LoadedMesh mesh;
+  mesh.file = file;
+  mesh.mesh = surface.surface.mesh();
+  ConvexBody hull = loader.hull(mesh);
+  hull.compute_derived_data();
+  return hull;
+}
+
 std::string inertia_text(const ToolSettings& settings) {
   switch (settings.inertia_source) {
     case InertiaSource::solid:

@@ -36,6 +36,10 @@ ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg);
 /// Returns a mesh as a tool of the kind and with the inertia of the settings.
 ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, const ToolSettings& settings);
 
+/// Returns the convex hull, in T, of the surface that contacts of a body use. file: name of its mesh. Not
+/// RT-safe: allocates, may take seconds.
+ConvexBody hull_of(const MeshBvh& surface, const std::filesystem::path& file, MeshLoader& loader);
+
 /// Returns what gives the inertia of a tool, for messages: "its inertia is that of its convex hull". Not
 /// RT-safe: allocates.
 std::string inertia_text(const ToolSettings& settings);

@@ -11,11 +11,10 @@
 
 namespace wrenchd {
 
-/// What an account must know of the loop.
+/// Properties of the servo loop that a WorkAccount needs.
 struct WorkAccountLoop {
-  /// Ticks after which a wrench that was sent still may act.
-  std::size_t delay_ticks = 4;
-  EncoderStep step = {};
+  std::size_t delay_ticks = 4;  ///< number of ticks for which a wrench may still act after it was sent
+  EncoderStep step = {};        ///< of the device; 0: not stated
 };
 
 /// Bounds the work that an external wrench does on the hand: by the energy that its source has declared, and

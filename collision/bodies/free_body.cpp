@@ -20,6 +20,7 @@ FreeBody load_free_body(const BodySettings& settings, const SceneSettings& scene
   }
   out.mesh = loader.build_bvh(out.body.mesh, out.body.kind, settings.shape.mesh, scene.surface_tolerance_m,
                               {scene.smoothing_m});
+  if (scene.smoothing_m > 0.0) out.body.hull = hull_of(*out.mesh, settings.shape.mesh, loader);
   out.motion.X_WB = settings.X_WM * out.body.X_MT();
   out.motion.velocity_W_m_per_s = settings.velocity_m_per_s;
   set_angular_velocity_W(M, settings.spin_rad_per_s, out.motion);

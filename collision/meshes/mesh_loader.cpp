@@ -359,12 +359,13 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
     return MeshBvh(std::move(surface), mesh, kind);
   }));
   const std::size_t used = bvh->surface.triangles().size();
-  if (used > triangles)
+  const bool is_other = used != triangles || bvh->surface_tolerance_m > 0.0;
+  if (smooth && is_other)
     add_once(simplifications_, file.string() + ": contacts use a smoothed surface of " +
                                    with_thousands_separators(used) + " triangles in place of " +
                                    with_thousands_separators(triangles) + ", " +
                                    bound_text(bvh->surface_tolerance_m) + " away from them");
-  else if (used < triangles || bvh->surface_tolerance_m > 0.0)
+  else if (is_other)
     add_once(simplifications_, file.string() + ": contacts use an enclosing surface of " +
                                    contact_surface_text(used, triangles, bvh->surface_tolerance_m));
   return bvh;

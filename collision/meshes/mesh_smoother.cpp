@@ -34,7 +34,7 @@ struct Edge {
   Index faces = 0;                    ///< number of its faces
   bool smooth = false;
   Vector3d control_a_m = Vector3d::Zero(), control_b_m = Vector3d::Zero();
-  double height_m = 0.0;  ///< of the curve above the straight edge
+  double height_m = 0.0;  ///< largest distance of the curve from the straight edge [m]
   Index parts = 1;
   Index first_point = 0;  ///< number of its first inner point in the result
 };

@@ -4,8 +4,6 @@
 #include <chrono>
 #include <string>
 
-#include <spdlog/fmt/fmt.h>
-
 #include "core/clock.hpp"
 #include "daemon/control/vector_param.hpp"
 
@@ -18,18 +16,12 @@ constexpr double kMaxRotation_rad = 6.2831853071795865;
 constexpr double kMinExpiry_s = 0.01, kMaxExpiry_s = 60.0;
 constexpr double kDefaultExpiry_s = 0.5;
 
-void check_length(const char* parameter, const Vector3d& v, double limit, const char* limit_text) {
-  if (v.norm() <= limit) return;
-  throw RpcError(RpcCode::invalid_params, "'" + std::string(parameter) + "' has a length of " +
-                                              fmt::format("{:.3f}", v.norm()) + "; set a goal within " +
-                                              limit_text + ".");
-}
-
 HandGoal goal_of(const Json& params) {
   const Vector3d position_m = vector_of(params, "position_m", Vector3d::Zero());
   const Vector3d rotation_rad = vector_of(params, "rotation_vector_rad", Vector3d::Zero());
-  check_length("position_m", position_m, kMaxDistance_m, "1 m of the device base");
-  check_length("rotation_vector_rad", rotation_rad, kMaxRotation_rad, "one turn (6.28 rad)");
+  check_length("position_m", position_m, kMaxDistance_m, "m", "set a goal within 1 m of the device base");
+  check_length("rotation_vector_rad", rotation_rad, kMaxRotation_rad, "rad",
+               "set a goal within one turn (6.28 rad)");
   const double expires_s = params.value("expires_s", kDefaultExpiry_s);
   if (expires_s < kMinExpiry_s || expires_s > kMaxExpiry_s)
     throw RpcError(RpcCode::invalid_params,

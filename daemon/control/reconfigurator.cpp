@@ -150,6 +150,15 @@ void Reconfigurator::keep_bodies(SceneSettings& scene) {
   }
 }
 
+/// Returns the present scene, built again if its smoothing changes. scene: its settings, which get the new
+/// value.
+Reconfigurator::BuiltScene Reconfigurator::with_smoothing(SceneSettings& scene, double smoothing_m) {
+  if (scene.smoothing_m == smoothing_m) return {scene_, {}, loaded_};
+  scene.smoothing_m = smoothing_m;
+  keep_bodies(scene);
+  return build_scene(scene, *loaded_, FileScope());
+}
+
 FileScope Reconfigurator::client_scope() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::filesystem::path> directories = SearchPath().directories();
@@ -299,12 +308,7 @@ std::vector<ChangedValue> Reconfigurator::set_rendering(const TomlNode& changes,
   change_rendering(changes, source, settings);
   std::vector<ChangedValue> changed = changed_values(config_.settings, settings);
   SceneSettings scene = config_.scene;
-  BuiltScene built = {scene_, {}, loaded_};
-  if (scene.smoothing_m != settings.rendering.smoothing_m) {
-    scene.smoothing_m = settings.rendering.smoothing_m;
-    keep_bodies(scene);
-    built = build_scene(scene, *loaded_, FileScope());
-  }
+  BuiltScene built = with_smoothing(scene, settings.rendering.smoothing_m);
   auto rendering = build_rendering(settings, built.scene);
   offer(std::move(rendering), settings, std::move(scene), present_scene()->text, std::move(built));
   return changed;
@@ -423,12 +427,7 @@ Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& 
   std::string fingerprint = files_fingerprint(scene);
   if (fingerprint == scene_fingerprint_) {
     SceneSettings settings = config_.scene;
-    if (settings.smoothing_m == scene.smoothing_m)
-      return {
-          false, std::move(fingerprint), std::move(settings), present_scene()->text, {scene_, {}, loaded_}};
-    settings.smoothing_m = scene.smoothing_m;
-    keep_bodies(settings);
-    BuiltScene built = build_scene(settings, *loaded_, FileScope());
+    BuiltScene built = with_smoothing(settings, scene.smoothing_m);
     return {false, std::move(fingerprint), std::move(settings), present_scene()->text, std::move(built)};
   }
   SceneSettings settings = scene;

@@ -163,6 +163,7 @@ class Reconfigurator {
   };
 
   void keep_bodies(SceneSettings& scene);
+  BuiltScene with_smoothing(SceneSettings& scene, double smoothing_m);
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
   static BuiltScene build_scene(const SceneSettings& scene, MeshLoader meshes, const FileScope& scope);

@@ -24,19 +24,14 @@ struct Source {
   TimePoint expires{};
 };
 
-void check_length(const char* parameter, const Vector3d& v, double limit, const char* unit) {
-  if (v.norm() <= limit) return;
-  throw RpcError(RpcCode::invalid_params,
-                 fmt::format("'{}' has a length of {:.4g} {}, and the limits allow at most {:.4g} {}.",
-                             parameter, v.norm(), unit, limit, unit));
-}
-
 ExternalWrenchRequest request_of(const Json& params, const LimitSettings& limits, TimePoint now) {
   ExternalWrenchRequest request;
   request.F_H_W = {vector_of(params, "force_N", Vector3d::Zero()),
                    vector_of(params, "torque_Nm", Vector3d::Zero())};
-  check_length("force_N", request.F_H_W.force_N, limits.max_force_N, "N");
-  check_length("torque_Nm", request.F_H_W.torque_Nm, limits.max_torque_Nm, "N.m");
+  check_length("force_N", request.F_H_W.force_N, limits.max_force_N, "N",
+               fmt::format("the limits allow at most {:.4g} N", limits.max_force_N));
+  check_length("torque_Nm", request.F_H_W.torque_Nm, limits.max_torque_Nm, "N.m",
+               fmt::format("the limits allow at most {:.4g} N.m", limits.max_torque_Nm));
   request.energy_J = params.value("energy_J", 0.0);
   if (request.energy_J < 0.0 || request.energy_J > WorkAccount::kMaxBalance_J)
     throw RpcError(

@@ -13,11 +13,11 @@ namespace wrenchd {
 ///
 /// In a tick without a usable sample the wrenches are those of the previous tick, and no work is done.
 struct Demand {
-  Wrench F_contact;   ///< Of contacts and local models.
-  Wrench F_weight;    ///< Holds the weight of the handle.
-  Wrench F_external;  ///< Of another program.
+  Wrench F_contact;   ///< Wrench of contacts and local models.
+  Wrench F_weight;    ///< Wrench that holds the weight of the handle.
+  Wrench F_external;  ///< Wrench that another program requests.
   DofMask undriven =
-      kNoDof;  ///< Components of either that are left out because the device has no motors for them.
+      kNoDof;  ///< Components of these wrenches that are left out because the device has no motors for them.
   Wrench F_T;  ///< Of the contact alone, about the origin and in the axes of the body frame T.
   bool sample_usable = false;
   CalmCondition calm;  ///< The handle is slow, and full authority would not push it much.

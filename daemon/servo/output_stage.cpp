@@ -31,13 +31,13 @@ bool is_same(const Wrench& a, const Wrench& b) noexcept {
 }  // namespace
 
 OutputStage::OutputStage(const LimitSettings& settings, const DeviceProfile& profile,
-                         const PassivityGuard& guard, const WorkAccount& account)
+                         const EnergyBounds& bounds)
     : profile_(profile),
       settings_(settings),
       limits_(settings, profile),
       heat_(profile, limits_.max_force_N(), limits_.max_torque_Nm()),
-      stabilizer_(profile, guard),
-      account_(account) {}
+      stabilizer_(profile, bounds.guard),
+      account_(bounds.account) {}
 
 LimitSettings OutputStage::set_limits(const LimitSettings& limits, bool armed) noexcept {
   settings_ = armed ? tighter(settings_, limits, profile_) : limits;
@@ -66,7 +66,8 @@ Stabilized OutputStage::stabilize(const Demand& demand, const DeviceSample& samp
                                 demand.crossfade_work_J, demand.obstacle_work_J, demand.local_model_work_J});
 }
 
-/// While a sample is missing, the work since the last one is not known, and the next sample brings it.
+/// Returns the part of the external wrench that the account allows. Without a usable sample no work is
+/// taken from the account: the next sample shows the work since the last one.
 Wrench OutputStage::permitted_external(const Demand& demand, const DeviceSample& sample,
                                        const TickTime& t) noexcept {
   account_.deposit(demand.external_declared_J);

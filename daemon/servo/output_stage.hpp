@@ -15,14 +15,13 @@ namespace wrenchd {
 /// members but the constructor are RT-safe.
 class OutputStage {
  public:
-  /// guard, account: of the first rendering. Not RT-safe: copies the profile's limits.
-  OutputStage(const LimitSettings& settings, const DeviceProfile& profile, const PassivityGuard& guard,
-              const WorkAccount& account);
+  /// bounds: of the first rendering. Not RT-safe: copies the profile's limits.
+  OutputStage(const LimitSettings& settings, const DeviceProfile& profile, const EnergyBounds& bounds);
 
   /// Replaces passivity guard and account, after the delay of the loop was measured again.
-  void set_guard(const PassivityGuard& guard, const WorkAccount& account) noexcept {
-    stabilizer_.set_guard(guard);
-    account_ = account;
+  void set_bounds(const EnergyBounds& bounds) noexcept {
+    stabilizer_.set_guard(bounds.guard);
+    account_ = bounds.account;
   }
   /// Changes the limits. While the loop is armed, values looser than those that hold are ignored. Returns the
   /// limits that hold from now on, the profile's included.
@@ -51,7 +50,7 @@ class OutputStage {
   /// Share of the contact wrench of the last tick that was sent, 0 to 1; 0 while the motors are off.
   double contact_share() const noexcept { return contact_share_; }
   const ContactStabilizer& stabilizer() const noexcept { return stabilizer_; }
-  /// Part of the external wrench that the last tick sent, and what it may still do.
+  /// The external wrench that the last tick sent, and the energy that it may still give to the hand.
   struct External {
     Wrench F;
     double balance_J = 0.0;
@@ -66,8 +65,8 @@ class OutputStage {
   WrenchLimits limits_;
   ThermalModel heat_;
   ContactStabilizer stabilizer_;
-  WorkAccount account_;                  ///< Of the external wrench.
-  Wrench F_external_sent_;               ///< In the last tick.
+  WorkAccount account_;                  ///< Bounds the work of the external wrench.
+  Wrench F_external_sent_;               ///< External wrench that the last tick sent.
   double external_sample_time_s_ = 0.0;  ///< Device time of the account's last sample.
   double contact_share_ = 0.0;           ///< Sent contact wrench over the requested one, in the last tick.
   Twist V_BH_;                           ///< Last finite twist of the handle.

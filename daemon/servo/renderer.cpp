@@ -157,13 +157,13 @@ void Renderer::report_scale(TimePoint now) noexcept {
   events_.emit(now, Event::StiffnessScaled{scale});
 }
 
-PassivityGuard Renderer::derive_stiffness(const TickTime& t) noexcept {
+EnergyBounds Renderer::derive_stiffness(const TickTime& t) noexcept {
   const auto [spring, damper, bound_known] = stability_.derive();
   scale_renderings();
   if (!bound_known) events_.emit(t.now, Event::StabilityBoundUnknown{});
   reported_scale_ = spring;
   if (spring < 1.0 || damper < 1.0) events_.emit(t.now, Event::StiffnessScaled{spring});
-  return stability_.make_guard();
+  return stability_.energy_bounds();
 }
 
 ContactState Renderer::project(const DeviceSample& sample, const Verdict& verdict, double sent_share,
@@ -328,8 +328,10 @@ void Renderer::advance_external_wrench(const TickTime& t) noexcept {
   const ExternalWrench::Evaluation external = external_wrench_.advance(t.now, t.dt_s);
   demand_.external_declared_J = external.declared_J;
   demand_.external_active = external.active && wrench_point_ == WrenchPoint::handle;
-  if (demand_.external_active)
-    demand_.F_external = restrict_to_dofs(workspace_.wrench_on_hand(external.F_H_W), driven_);
+  if (!demand_.external_active) return;
+  const Wrench F = workspace_.wrench_on_hand(external.F_H_W);
+  demand_.undriven = static_cast<DofMask>(demand_.undriven | (nonzero_dofs(F) & ~driven_));
+  demand_.F_external = restrict_to_dofs(F, driven_);
 }
 
 /// Ramps the share of the contact wrench that goes out, and recentres the workspace if that waits for it to

@@ -40,8 +40,8 @@ class Renderer {
   std::uint32_t apply(const Requests& requests, const Verdict& verdict, const DeviceReading& reading,
                       const TickTime& t) noexcept;
   /// Derives the stiffness that stays passive from the measured loop, and scales the renderings to it.
-  /// Returns the passivity guard for the measured delay.
-  PassivityGuard derive_stiffness(const TickTime& t) noexcept;
+  /// Returns the energy bounds for the measured delay.
+  EnergyBounds derive_stiffness(const TickTime& t) noexcept;
 
   /// p from the sample, and its projection q, which follows p from the previous tick's as a proxy. Without a
   /// usable sample the contact stays as it was. sent_share: share of the last contact wrench that was sent.
@@ -63,8 +63,7 @@ class Renderer {
   std::uint32_t change_count() const noexcept { return change_count_; }
   /// Share of the configured stiffness that stays passive.
   const StiffnessScale& stiffness_scale() const noexcept { return stability_.scale(); }
-  PassivityGuard make_guard() const noexcept { return stability_.make_guard(); }
-  WorkAccount make_work_account() const noexcept { return stability_.make_work_account(); }
+  EnergyBounds energy_bounds() const noexcept { return stability_.energy_bounds(); }
 
  private:
   bool follow_driven(const DeviceSample& sample, double sent_share, const TickTime& t) noexcept;

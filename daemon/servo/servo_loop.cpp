@@ -17,7 +17,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       clock_(clock, make_pace_watch(settings.servo)),
       port_(device),
       renderer_(settings, profile, std::move(rendering), requests_.renderings(), telemetry_.events()),
-      output_(settings.limits, profile, renderer_.make_guard(), renderer_.make_work_account()),
+      output_(settings.limits, profile, renderer_.energy_bounds()),
       supervisor_(settings, profile, output_.max_force_N(), output_.max_torque_Nm(), telemetry_.events()) {
   telemetry_.show_limits(output_.effective_limits());
 }
@@ -40,7 +40,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   clock_.lap(Stage::read);
 
   const Verdict v = supervisor_.judge(s, asked.commands, port_.last(), renderer_.proxy_valid(), t);
-  if (v.self_test_passed) output_.set_guard(renderer_.derive_stiffness(t), renderer_.make_work_account());
+  if (v.self_test_passed) output_.set_bounds(renderer_.derive_stiffness(t));
   const std::uint32_t changes = renderer_.apply(asked, v, in, t);
   if (asked.limits) change_limits(*asked.limits, v.armed());
   if (v.release) return leave(t, asked, in, Written{}, {});
@@ -53,7 +53,8 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
 
   const Stabilized f = output_.stabilize(d, s, supervisor_.preview(d, s, ready, t));  // passivity
   const Authority a = supervisor_.authorise(d, f, output_.overheated(), s, ready, t);
-  const Limited out = output_.limit(f, d, a, s, t);  // magnitude, heat, workspace, soft start, slew, power
+  const Limited out =
+      output_.limit(f, d, a, s, t);  // account, magnitude, heat, workspace, soft start, slew, power
   clock_.lap(Stage::limits);
 
   const Written w = port_.write(t.now, out.F, a, d.contact.X_BH_held);

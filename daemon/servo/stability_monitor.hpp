@@ -10,6 +10,13 @@
 
 namespace wrenchd {
 
+/// What bounds the energy that the loop gives to the hand: the guard of the contact wrench, and the account
+/// of the external wrench.
+struct EnergyBounds {
+  PassivityGuard guard;
+  WorkAccount account;
+};
+
 /// Measures period and delay of the running loop, and derives from them how much of the configured stiffness
 /// stays passive (core/METHOD.md, section 10). The self-test measures; when it has passed, derive() fixes the
 /// result until the next self-test. All members but the constructor are RT-safe.
@@ -34,10 +41,10 @@ class StabilityMonitor {
   double max_stable_scale(const LocalModels::TotalGains& gains) const noexcept {
     return analysis_.max_stable_scale_at_handle(derived_ ? derivation_ : measurement_, gains);
   }
-  /// The guard for the device and delay of the last derive().
-  PassivityGuard make_guard() const noexcept { return analysis_.make_passivity_guard(derivation_); }
-  /// The account of external wrenches for the device and delay of the last derive().
-  WorkAccount make_work_account() const noexcept { return analysis_.make_work_account(derivation_); }
+  /// The bounds for the device and delay of the last derive().
+  EnergyBounds energy_bounds() const noexcept {
+    return {analysis_.make_passivity_guard(derivation_), analysis_.make_work_account(derivation_)};
+  }
 
   /// The spring at the handle in axes of H, with scale(), and the longest lag of its wrench [s].
   Matrix6d stiffness_at_handle() const noexcept {

@@ -118,6 +118,47 @@ double largest_distance_m(const Rolled& a, const Rolled& b) {
 
 }  // namespace
 
+TEST_CASE("tool, obstacles and free bodies are smoothed, for meshes and for half-spaces",
+          "[smoothed_contact]") {
+  const auto sphere = [] {
+    GeneratedMesh made;
+    made.kind = "sphere";
+    made.triangles = 80;
+    return made;
+  };
+  SceneSettings settings;
+  settings.tool.generated = sphere();
+  settings.tool.mesh = generated_mesh_name(sphere());
+  settings.half_spaces.push_back({"table", Vector3d::UnitZ(), -0.1});
+  MeshObstacleSettings obstacle;
+  obstacle.name = "obstacle";
+  obstacle.generated = sphere();
+  obstacle.mesh = generated_mesh_name(sphere());
+  obstacle.X_WM.translation_m = {0.2, 0.0, 0.0};
+  settings.meshes.push_back(obstacle);
+  BodySettings body;
+  body.name = "body";
+  body.shape = settings.tool;
+  body.X_WM.translation_m = {-0.2, 0.0, 0.0};
+  settings.bodies.push_back(body);
+  MeshLoader loader;
+  const Scene coarse(settings, loader);
+  settings.smoothing_m = 1e-3;
+  const Scene smooth(settings, loader);
+  const auto grows = [](std::size_t from, std::size_t to) { return to > 20 * from; };
+  CHECK(
+      grows(coarse.tool_mesh()->surface.triangles().size(), smooth.tool_mesh()->surface.triangles().size()));
+  CHECK(grows(coarse.tool().hull.vertices_T_m.size(), smooth.tool().hull.vertices_T_m.size()));
+  CHECK(grows(coarse.meshes()[0].mesh->surface.triangles().size(),
+              smooth.meshes()[0].mesh->surface.triangles().size()));
+  const FreeBody &before = coarse.bodies()[0], &after = smooth.bodies()[0];
+  CHECK(grows(before.mesh->surface.triangles().size(), after.mesh->surface.triangles().size()));
+  CHECK(grows(before.body.hull.vertices_T_m.size(), after.body.hull.vertices_T_m.size()));
+  CHECK(after.body.mesh.triangles.size() == before.body.mesh.triangles.size());  // shown as loaded
+  CHECK(after.body.solid.inertia.mass_kg == before.body.solid.inertia.mass_kg);
+  CHECK(loader.simplifications().back().find("smoothed surface of") != std::string::npos);
+}
+
 TEST_CASE("smoothing takes the facets of a rolling ball out of the torque", "[smoothed_contact][long]") {
   const Scene faceted = ball_on_table(false, 0.0), round = ball_on_table(false, kSmoothing_m);
   // speed, and by how much the torque above 30 Hz must fall; at 0.05 m/s the facets come at 26 Hz

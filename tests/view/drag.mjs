@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // With Shift the mouse moves and rotates the tool of a simulated device; afterwards the hand returns to its path.
 import assert from "node:assert/strict";
-import { writeFileSync } from "node:fs";
-import { daemon, file, open, test, text, until, view } from "./browser.mjs";
+import { test, text, until } from "./browser.mjs";
+import { openRestingHand } from "./resting_hand.mjs";
 
 test(async () => {
-  const hand = file("rest.toml"), config = file("wrenchd.toml");
-  writeFileSync(hand, "repeats = false\n[[waypoint]]\ntime_s = 0.0\nposition_m = [0.0, 0.0, 0.065]\n");
-  writeFileSync(config, `[simulation]\nhand_script = "${hand}"\n`);
-  const wrenchd = await daemon(["--config", config]);
-  const server = await view(["--socket", wrenchd.socket]);
-  const page = await open(server.url, { viewport: { width: 700, height: 500 } });
-  await until("the tool is there", () => page.evaluate(() => window.view.world().ghost !== null && window.view.frame().q !== null));
-  await until("the page knows that the device is simulated", async () => (await text(page, "device")) === "present");
-  const pose = () => page.evaluate(() => window.view.frame().hand);
+  const { page, pose, rest } = await openRestingHand({ width: 700, height: 500 });
   const eye = () => page.evaluate(() => window.view.world().eye);
-  const rest = await pose();
-  assert.ok(Math.abs(rest[2] - 0.065) < 1e-3);
   // The mouse may miss the tool on a slow machine; then it aims again.
   const grab = (button) => until("the tool is grabbed", async () => {
     const [x, y] = await page.evaluate(() => window.view.toolOnScreen());

@@ -103,32 +103,31 @@ void couple(wrenchd::Client& client, double seconds) {
   while (!reader.latest(tick)) std::this_thread::sleep_for(kCycle);
   Arm arm;
   // The spring is at rest at the start, wherever the handle is.
-  Vector handle = handle_m(tick), tip = arm.tip_m(), rest{};
+  Vector handle = handle_m(tick), tip = arm.tip_m(), tip_before = tip, rest{};
   for (int i = 0; i < 3; ++i) rest[i] = tip[i] - handle[i];
   double energy_J = kReserve_J, declared_J = 0.0, time_s = 0.0, printed_s = 0.0;
   const double cycle_s = std::chrono::duration<double>(kCycle).count();
   for (auto due = std::chrono::steady_clock::now(); seconds < 0.0 || time_s < seconds; time_s += cycle_s) {
     reader.latest(tick);
-    const Vector handle_before = handle, tip_before = tip;
+    const Vector handle_before = handle;
     handle = handle_m(tick);
     Vector on_hand{};
-    double length = 0.0;
     for (int i = 0; i < 3; ++i) {
       const double stretch_m = tip[i] - handle[i] - rest[i];
       const double rate_m_per_s = (tip[i] - tip_before[i] - handle[i] + handle_before[i]) / cycle_s;
       on_hand[i] = kSpring_N_per_m * stretch_m + kDamper_N_s_per_m * rate_m_per_s;
     }
-    length = std::sqrt(dot(on_hand, on_hand));
-    if (length > kMaxForce_N)
+    if (const double length = std::sqrt(dot(on_hand, on_hand)); length > kMaxForce_N)
       for (double& x : on_hand) x *= kMaxForce_N / length;
     client.set_wrench(on_hand, {}, std::clamp(energy_J, 0.0, 1.0), kExpiry);
     declared_J += energy_J;
-    const Vector before = tip;
+    tip_before = tip;
     const Vector on_tip = {-on_hand[0], -on_hand[1], -on_hand[2]};
     for (int i = 0; i < 2; ++i) arm.step(on_tip);
     tip = arm.tip_m();
     // What the arm does by pulling the spring may reach the hand.
-    energy_J = std::max(dot(on_hand, {tip[0] - before[0], tip[1] - before[1], tip[2] - before[2]}), 0.0);
+    energy_J =
+        std::max(dot(on_hand, {tip[0] - tip_before[0], tip[1] - tip_before[1], tip[2] - tip_before[2]}), 0.0);
     if (time_s >= printed_s) {
       printed_s += 0.5;
       std::printf(
@@ -147,9 +146,18 @@ void couple(wrenchd::Client& client, double seconds) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  double seconds = -1.0;
+  if (argc > 1) {
+    char* end = nullptr;
+    seconds = std::strtod(argv[1], &end);
+    if (argc > 2 || *end != '\0' || !(seconds > 0.0)) {
+      std::fprintf(stderr, "usage: %s [SECONDS]; without SECONDS until Ctrl-C\n", argv[0]);
+      return 2;
+    }
+  }
   try {
     wrenchd::Client client;
-    couple(client, argc > 1 ? std::atof(argv[1]) : -1.0);
+    couple(client, seconds);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -78,7 +78,7 @@ TEST_CASE("hand.set says why a hand cannot be moved", "[hand_methods]") {
   CHECK(rejection(table, there, Role::observer).find("operator") != std::string::npos);
   CHECK(rejection(table, Json::object()).find("position_m") != std::string::npos);
   CHECK(rejection(table, {{"position_m", {0.0, 3.0, 0.1}}}) ==
-        "'position_m' has a length of 3.002; set a goal within 1 m of the device base.");
+        "'position_m' has a length of 3.002 m; set a goal within 1 m of the device base.");
   CHECK(rejection(table, {{"position_m", {0, 0, 0}}, {"rotation_vector_rad", {0, 0, 7}}})
             .find("within one turn") != std::string::npos);
   for (const double expires_s : {0.0, -1.0, 61.0})

@@ -76,9 +76,9 @@ TEST_CASE("wrench.set says which value is wrong, and changes nothing", "[wrench_
   Rig rig;
   const Json force = {0.0, 0.0, 1.0};
   CHECK(contains(rig.rejection({{"force_N", {0.0, 0.0, 11.0}}}),
-                 "'force_N' has a length of 11 N, and the limits allow at most 10 N."));
+                 "'force_N' has a length of 11 N; the limits allow at most 10 N."));
   CHECK(contains(rig.rejection({{"force_N", force}, {"torque_Nm", {0.0, 0.9, 0.0}}}),
-                 "'torque_Nm' has a length of 0.9 N.m, and the limits allow at most 0.5 N.m."));
+                 "'torque_Nm' has a length of 0.9 N.m; the limits allow at most 0.5 N.m."));
   CHECK(contains(rig.rejection({{"force_N", force}, {"energy_J", 1.5}}), "'energy_J' must be 0 to 1;"));
   CHECK(contains(rig.rejection({{"force_N", force}, {"energy_J", -0.1}}), "'energy_J' must be 0 to 1;"));
   CHECK(contains(rig.rejection({{"force_N", force}, {"expires_s", 1.5}}), "'expires_s' must be 0.005 to 1;"));

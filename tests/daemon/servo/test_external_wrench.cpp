@@ -121,6 +121,37 @@ TEST_CASE("an external wrench without energy does not move the hand", "[external
   CHECK(run.motors_J() - before_J <= 1e-12);
 }
 
+TEST_CASE("on a device with a longer delay an external wrench needs a larger reserve", "[external_wrench]") {
+  RunConfig slow = resting();
+  slow.settings.simulation.command_delay_s = 0.010;
+  const auto largest_N = [](const RunConfig& config) {
+    ActiveLoop run(config);
+    double most_N = 0.0;
+    for (int k = 0; k < 60; ++k) {
+      if (k == 0) run.request(push(4.0, 0.05, run.in(0.5)));
+      run.tick();
+      most_N = std::max(most_N, run.external_N());
+    }
+    return most_N;
+  };
+  const double fast_N = largest_N(resting()), slow_N = largest_N(slow);
+  CHECK(fast_N > 1.5);
+  CHECK(slow_N > 0.0);
+  CHECK(slow_N < 0.5 * fast_N);  // the self-test has measured the delay
+}
+
+TEST_CASE("components without a motor are left out of an external wrench, and the record says which",
+          "[external_wrench]") {
+  RunConfig config = resting();
+  config.profile.wrench_report.torque.present = false;
+  ActiveLoop run(config);
+  run.request({{{0.0, 0.0, 2.0}, {0.0, 0.1, 0.0}}, 1.0, run.in(0.5)});
+  run.run(0.1);
+  CHECK(run.last.F_external[2] > 1.0);
+  CHECK(run.last.F_external[4] == 0.0);
+  CHECK(run.last.undriven_dofs == (1U << 4U));
+}
+
 TEST_CASE("the limits hold for the sum of contact and external wrench", "[external_wrench]") {
   RunConfig config = resting();
   config.settings.limits.max_force_N = 4.0;
