@@ -324,7 +324,8 @@ void check_rendering(const SectionValues& values, Settings& settings) {
     values.value("contacts")
         .reject("only method = \"exact\" detects contacts with CGAL; choose it, or leave contacts out");
   if (settings.rendering.smoothing_m > 0.0 && settings.rendering.method != Method::exact)
-    values.value("smoothing_m").reject("only method = \"exact\" uses smoothed surfaces; choose it, or leave smoothing_m out");
+    values.value("smoothing_m")
+        .reject("only method = \"exact\" uses smoothed surfaces; choose it, or leave smoothing_m out");
 }
 
 struct Section {

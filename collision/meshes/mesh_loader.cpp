@@ -41,8 +41,8 @@ std::string_view body_kind_name(BodyKind kind) {
   return kind == BodyKind::solid ? "solid" : "surface";
 }
 
-/// Smooths a simplified mesh, or the loaded mesh if it was not simplified. Numbers of vertices and triangles
-/// remain those of the loaded mesh.
+/// Smooths a simplified mesh, or the loaded mesh if it was not simplified. source_vertex and source_triangle
+/// of the result refer to the loaded mesh.
 SimplifiedMesh smoothed(SimplifiedMesh simplified, const TriangleMesh& loaded, const Smoothing& smoothing) {
   if (simplified.mesh.triangles.empty()) return smoothed(loaded, smoothing);
   SimplifiedMesh out = smoothed(simplified.mesh, smoothing);

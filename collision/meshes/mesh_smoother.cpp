@@ -16,13 +16,12 @@ namespace {
 
 using Index = std::uint32_t;
 
-/// Distance between the smooth surface and the triangles that follow it, where the number of triangles
-/// permits [m]. The torque of a contact that rolls over them is then a hundredth of the force times a
-/// millimetre.
+/// Largest distance between the smooth surface and the triangles that follow it, if the permitted number of
+/// triangles suffices [m].
 constexpr double kDeviation_m = 0.1e-6;
 /// Factor by which the deviation grows until the triangles are few enough.
 constexpr double kCoarser = 1.3;
-/// Most parts of an edge.
+/// Largest number of parts of an edge.
 constexpr Index kMaxParts = 24;
 /// Two creases at a vertex are one curve if they turn by less than this angle [rad].
 constexpr double kCurveAngle_rad = 1.0;
@@ -39,7 +38,7 @@ struct Edge {
   Index first_point = 0;  ///< number of its first inner point in the result
 };
 
-/// Point of a cubic curve at t.
+/// Returns the point of a cubic curve at t, 0 to 1.
 Vector3d on_curve(const Vector3d& a, const Edge& edge, const Vector3d& b, double t) {
   const double s = 1.0 - t;
   return s * s * s * a + 3.0 * s * s * t * edge.control_a_m + 3.0 * s * t * t * edge.control_b_m +
@@ -103,8 +102,8 @@ class MeshSmoother {
     }
   }
 
-  /// The corners of a vertex between two creases share a normal. Its weights are exact on a sphere (Max
-  /// 1999).
+  /// Computes the normals. The corners of a vertex between two creases share one: core/METHOD.md, section
+  /// 14.11.
   void find_normals() {
     group_.resize(edge_of_.size());
     std::iota(group_.begin(), group_.end(), 0);
@@ -148,7 +147,7 @@ class MeshSmoother {
     }
   }
 
-  /// The neighbours of each vertex along creases: two, or none that count.
+  /// Finds two neighbours of each vertex along creases, and counts them.
   void find_crease_neighbours() {
     constexpr Index kNone = ~Index{0};
     creases_.assign(mesh_.vertices_m.size(), {kNone, kNone, 0});
@@ -162,8 +161,8 @@ class MeshSmoother {
     }
   }
 
-  /// The part of the chord along the crease curve at vertex v: that of the circle through v and its two
-  /// neighbours. The chord itself at an end or a corner of the curve.
+  /// Returns the projection of the chord on the tangent of the crease curve at vertex v: the tangent of the
+  /// circle through v and its two neighbours. Returns the chord itself at an end or a corner of the curve.
   Vector3d tangent(Index v, const Vector3d& chord) const {
     const auto& [first, second, count] = creases_[v];
     if (count != 2) return chord;
@@ -185,7 +184,8 @@ class MeshSmoother {
     edge.height_m = share * height_m;
   }
 
-  /// A curve of n parts deviates from its polygon by its height divided by n^2.
+  /// Chooses the number of parts of each edge. A curve of n parts deviates from its polygon by its height
+  /// divided by n^2.
   void choose_parts(std::size_t max_triangles) {
     for (double deviation_m = kDeviation_m;; deviation_m *= kCoarser) {
       for (Edge& edge : edges_)
@@ -232,7 +232,7 @@ class MeshSmoother {
     }
   }
 
-  /// The points of a side of a face, in the direction of its half-edge, both ends included.
+  /// Returns the points of a side of a face, in the direction of its half-edge, both ends included.
   std::vector<Index> side(Index half_edge) const {
     const Edge& edge = edges_[edge_of_[half_edge]];
     const bool forward = corner(half_edge) == edge.a;
@@ -251,7 +251,7 @@ class MeshSmoother {
     fill_grid(sides, m, face);
   }
 
-  /// Sides of one or two parts.
+  /// Fills a face whose sides have one or two parts.
   void fill_halves(const std::array<std::vector<Index>, 3>& sides, Index face) {
     if (sides[0].size() == 3 && sides[1].size() == 3 && sides[2].size() == 3) {
       for (std::size_t i = 0; i < 3; ++i) add_triangle(sides[i][0], sides[i][1], sides[(i + 2) % 3][1], face);
@@ -266,7 +266,7 @@ class MeshSmoother {
       add_triangle(sides[first][1], around[i], around[i + 1], face);
   }
 
-  /// A grid of m parts inside, joined with the points of the sides.
+  /// Fills a face with a grid of m parts, and joins the grid with the points of the sides.
   void fill_grid(const std::array<std::vector<Index>, 3>& sides, Index m, Index face) {
     const Patch patch = patch_of(face);
     const Index rows = m - 2;  // inner points along each side of the grid
@@ -290,7 +290,7 @@ class MeshSmoother {
     for (std::size_t k = 0; k < 3; ++k) join(sides[k], rims[k], m, face);
   }
 
-  /// The strip between the points of a side and the rim of the grid.
+  /// Fills the strip between the points of a side and the rim of the grid.
   void join(const std::vector<Index>& outer, const std::vector<Index>& inner, Index m, Index face) {
     const auto parts = static_cast<double>(outer.size() - 1);
     std::size_t o = 0, i = 0;

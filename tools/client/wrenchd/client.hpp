@@ -83,10 +83,10 @@ class Client {
                  const std::array<double, 3>& rotation_vector_rad = {},
                  std::chrono::milliseconds expires_after = std::chrono::milliseconds(500));
 
-  /// Acts on the hand: force [N] and torque about the handle point [N.m], in axes of the world. energy_J: that
-  /// the wrench may give to the hand from now on [J], beside what the hand gave to it. Call it again before it
-  /// expires; then the wrench fades out within 50 ms. Throws ClientError if a value exceeds its limit, or if
-  /// another program acts on the hand.
+  /// Acts on the hand: force [N] and torque about the handle point [N.m], in axes of the world. energy_J:
+  /// that the wrench may give to the hand from now on [J], beside what the hand gave to it. Call it again
+  /// before it expires; then the wrench fades out within 50 ms. Throws ClientError if a value exceeds its
+  /// limit, or if another program acts on the hand.
   void set_wrench(const std::array<double, 3>& force_N, const std::array<double, 3>& torque_Nm = {},
                   double energy_J = 0.0,
                   std::chrono::milliseconds expires_after = std::chrono::milliseconds(100));
