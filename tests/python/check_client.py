@@ -96,6 +96,22 @@ class Commands(unittest.TestCase):
         if tick.contact_list:
             self.assertAlmostEqual(sum(contact.load_fraction for contact in tick.contact_list), 1.0)
 
+    def test_arms_and_waits(self):
+        with self.assertRaises(wrenchd.Rejected):
+            self.client.arm(within_s=5)  # no lease
+        with self.client.lease():
+            try:
+                self.client.arm(within_s=10)
+            except wrenchd.WrenchdError as error:  # a busy machine delays the loop
+                self.assertRegex(str(error), "^the loop (did not become|is not) active.*: .")
+            else:
+                self.assertIn(self.client.status()["state"], ("active", "fault"))
+            self.client.stop()
+            with self.assertRaises(wrenchd.Rejected) as rejected:
+                self.client.arm(within_s=5)
+            self.assertIn("cannot be armed in state", str(rejected.exception))
+        self.assertTrue(soon(lambda: becomes_disarmed(self.client)))
+
     def test_moves_the_hand(self):
         with self.client.open_state() as state:
             self.client.move_hand([0.1, 0.0, 0.1], expires_s=30)

@@ -89,9 +89,24 @@ class Client:
     def reload(self):
         return self.call("reload")
 
-    def arm(self):
-        """Arms the loop. Requires the lease."""
-        return self.call("arm")
+    def arm(self, within_s=None):
+        """Arms the loop. Requires the lease. With within_s, waits until the loop is active, and before until the force of
+        another program has faded. Raises Rejected if a fault prevents it, and Timeout with the reason after within_s."""
+        if within_s is None:
+            return self.call("arm")
+        ends_s = time.monotonic() + within_s
+        answer = None
+        while True:
+            status = self.status()
+            if answer is None and status["state"] != "releasing":
+                answer = self.call("arm")
+            elif answer is not None and status["state"] == "active":
+                return answer
+            elif answer is not None and status["state"] in ("fault", "stopped"):
+                raise Rejected(Rejected.INVALID_STATE, f"the loop did not become active: {status['no_force']}")
+            if time.monotonic() > ends_s:
+                raise Timeout(f"the loop is not active after {within_s} s: {status['no_force']}")
+            time.sleep(0.01)
 
     def disarm(self):
         return self.call("disarm")
