@@ -145,7 +145,7 @@ TEST_CASE("on a device with a longer delay an external wrench needs a larger res
 
 TEST_CASE("components without a motor are left out of an external wrench, and the record says which",
           "[external_wrench]") {
-  RunConfig config = resting();
+  RunConfig config = shipped_config();  // its hand moves, and the self-test sees that
   config.profile =
       load_profile(source_path("config/profiles/polhem.toml"), SearchPath({source_path("config")}));
   VirtualClock clock;
