@@ -78,23 +78,23 @@ std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config) {
 }
 
 Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
-                 const MeshLoader& meshes)
-    : Runtime(std::move(config), link, clock, search_mode, meshes, meshes) {}
+                 const MeshLoader& meshes, const HandScene& hand)
+    : Runtime(std::move(config), link, clock, search_mode, meshes, meshes, hand) {}
 
 /// `used` reads the scene and keeps the warnings and the files. `fresh` has read nothing: the reconfigurator
 /// copies it for each scene that is loaded.
 Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
-                 const MeshLoader& fresh, MeshLoader used)
+                 const MeshLoader& fresh, MeshLoader used, const HandScene& hand)
     : config_(std::move(config)),
       clock_(clock),
-      scene_(std::make_shared<const Scene>(config_.scene, used)),
+      scene_(hand.scene ? hand.scene : std::make_shared<const Scene>(config_.scene, used)),
       mesh_remarks_(used.changes()),
       recorded_texts_(read_recorded_texts(config_)),
       device_(config_.profile, link),
       loop_(config_.settings, config_.profile, device_,
             std::make_unique<Rendering>(
                 0, config_.settings, config_.profile, scene_,
-                make_proxy_initializer(scene_, search_mode, config_.settings.rendering.contacts)),
+                make_proxy_initializer(scene_, search_mode, config_.settings.rendering.contacts), hand.tool),
             clock),
       reconfigurator_(config_, scene_, loop_, search_mode, fresh, used) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());

@@ -13,6 +13,7 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "daemon/control/reconfigurator.hpp"
+#include "daemon/hand_scenes.hpp"
 #include "daemon/recording/recording_file.hpp"
 #include "daemon/run_config.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
@@ -47,10 +48,11 @@ std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config);
 /// reconfigurator. Not RT-safe.
 class Runtime {
  public:
-  /// Link and clock must outlive this object. meshes: loader of the scene's meshes. Throws MeshError,
-  /// std::runtime_error. May take seconds: reads meshes.
+  /// Link and clock must outlive this object. meshes: loader of the scene's meshes. hand: one of two, whose
+  /// scene `meshes` has read. Throws MeshError, std::runtime_error. May take seconds: reads meshes.
   Runtime(RunConfig config, ReportLink& link, Clock& clock,
-          ProxySearchMode search_mode = ProxySearchMode::background, const MeshLoader& meshes = {});
+          ProxySearchMode search_mode = ProxySearchMode::background, const MeshLoader& meshes = {},
+          const HandScene& hand = {});
   ~Runtime();
   Runtime(const Runtime&) = delete;
   Runtime& operator=(const Runtime&) = delete;
@@ -90,7 +92,7 @@ class Runtime {
   Reconfigurator reconfigurator_;
 
   Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
-          const MeshLoader& fresh, MeshLoader used);
+          const MeshLoader& fresh, MeshLoader used, const HandScene& hand);
 };
 
 }  // namespace wrenchd

@@ -89,6 +89,16 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
     body.radius_m = meshes[i]->surface.radius_m();
     for (const Vector3d& p : given.body.hull.vertices_T_m) body.radius_m = std::max(body.radius_m, p.norm());
   }
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    bodies_[i].mover = i;
+    if (i > 0 && !bodies[i - 1].of_hand) continue;
+    bodies_[i].tool = tools_.size();
+    tools_.push_back({});
+    tools_.back().body = i;
+  }
+  if (tools_.size() > kMaxTools || (tools_.size() == kMaxTools && !is_tool(bodies_.size() - 1)))
+    throw std::invalid_argument("at most one body is the tool of a second hand, and it is the last one");
+  tools_before_ = tools_;
   const auto body_of = [&](std::size_t i) -> const ToolBody& {
     return i == 0 ? scene.tool() : bodies[i - 1].body;
   };
@@ -121,25 +131,31 @@ void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
   std::erase_if(contacts_, [&](const BodyContact& c) { return c.a == body || c.b == body; });
   for (const auto& pair : pairs_)
     if (pair->a() == body || pair->b() == body) pair->reset();
-  return_.reset();
   constexpr double kSame = 1e-12;  // [m, rad]
-  if (grasp_ &&
-      log(inverse(bodies_[0].motion.X_WB * grasp_->X_TB) * bodies_[grasp_->body].motion.X_WB).norm() > kSame)
-    grasp_.reset();
+  for (Tool& tool : tools_) {
+    if (!is_tool(body) || tool.body == body) tool.back.reset();
+    if (tool.grasp && log(inverse(bodies_[tool.body].motion.X_WB * tool.grasp->X_TB) *
+                          bodies_[tool.grasp->body].motion.X_WB)
+                              .norm() > kSame)
+      tool.grasp.reset();
+  }
+  find_movers();
 }
 
 double BodyWorld::energy_J() const noexcept {
   double sum = 0.0;
-  for (std::size_t i = 1; i < bodies_.size(); ++i)
-    sum += kinetic_energy_J(bodies_[i].M, bodies_[i].motion) -
-           bodies_[i].M.mass_kg * settings_.gravity_W_m_per_s2.dot(bodies_[i].motion.X_WB.translation_m);
+  for (const Body& body : bodies_)
+    if (body.tool == kNoTool)
+      sum += kinetic_energy_J(body.M, body.motion) -
+             body.M.mass_kg * settings_.gravity_W_m_per_s2.dot(body.motion.X_WB.translation_m);
   return sum;
 }
 
-BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, double until_s) noexcept {
+BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, double until_s,
+                                  std::size_t tool) noexcept {
   dt_s_ = dt_s;
   until_s_ = until_s;
-  begin(hand);
+  begin(hand, tool);
   bool clean = false;
   for (rounds_ = 0; rounds_ < settings_.rounds && !clean; ++rounds_) {
     solve_islands();
@@ -147,8 +163,8 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
     if (clean) clean = !drop_separated();
   }
   if (!clean) hold_all();
-  apply_impulses();
-  finish_grasp();
+  apply_impulses(tool);
+  finish_grasps();
   if (clean) time_s_ = until_s;
   if (settings_.sleeps) fall_asleep();
   prefetch();
@@ -161,7 +177,7 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
 /// core/METHOD.md, section 15.7: the tool stays in a ball about the hand's pose, because T falls on its way.
 bool BodyWorld::bodies_are_out_of_reach(const Pose& X_WP) const noexcept {
   const Body& tool = bodies_[0];
-  if (grasp_ || return_ || tool.friction > 0.0) return false;
+  if (tools_.size() > 1 || tools_[0].grasp || tools_[0].back || tool.friction > 0.0) return false;
   const double reach_m =
       tool.radius_m + std::sqrt(energy(tool.M, X_WP, tool.motion.X_WB) / tool.M.mass_kg) + kReachMargin_m;
   const auto is_far = [&](const Body& body) {
@@ -177,15 +193,15 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
   // Between two consecutive calls only the tool changes, so the copies of the bodies and contacts stay valid.
   if (!tool_was_moved_) {
     std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
-    tool_load_W_ = {};
+    tools_[0].load_W = {};
     save();
   }
   bodies_before_[0] = {bodies_[0].motion, false, 0};
   time_before_s_ = time_s_;
   bodies_[0].motion.X_WB = X_WT;
   time_s_ = until_s;
-  grasp_broke_ = false;
-  work_on_tool_J_ = 0.0;
+  tools_[0].grasp_broke = false;
+  tools_[0].work_J = 0.0;
   tool_was_moved_ = true;
 }
 
@@ -195,16 +211,29 @@ void BodyWorld::save() noexcept {
   for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
   contacts_before_ = contacts_;  // equal capacities: no allocation
   time_before_s_ = time_s_;
-  grasp_before_ = grasp_;
-  return_before_ = return_;
-  tool_load_before_W_ = tool_load_W_;
+  tools_before_ = tools_;
 }
 
-/// Sets the goals of all bodies and moves the contacts with the obstacles that move.
-void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
+void BodyWorld::enter_tool(std::size_t tool, const Pose& X_WT) noexcept {
+  BodyMotion motion;
+  motion.X_WB = X_WT;
+  place(tools_[tool].body, motion);
+  tools_[tool].hand = Hand{X_WT};
+}
+
+void BodyWorld::remove_tool(std::size_t tool) noexcept {
+  Tool& out = tools_[tool];
+  out.hand.reset();
+  std::erase_if(contacts_, [&](const BodyContact& c) { return c.a == out.body || c.b == out.body; });
+  let_go(tool);
+  out.back.reset();
+  out.load_W = {};
+}
+
+/// Sets the goals of all bodies and moves the contacts with the obstacles that move. hand: of this tool.
+void BodyWorld::begin(const std::optional<Hand>& hand, std::size_t tool) noexcept {
   save();
   tool_was_moved_ = false;
-  grasp_broke_ = false;
   budget_ = {settings_.node_visits};
   solver_steps_ = 0;
   last_change_m_ = 0.0;
@@ -215,16 +244,13 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
     body.weight_per_s2 = 1.0;
     body.X_WQ = body.X_WQ_swept = body.motion.X_WB;
   }
-  Body& tool = bodies_[0];
-  tool.weight_per_s2 = hand ? hand->stiffness_per_s2 : 0.0;
-  if (hand) X_WP_ = hand->X_WP;
-  if (!hand) {
-    std::erase_if(contacts_, [](const BodyContact& c) { return c.a == 0; });
-    let_go();
-    return_.reset();
-    tool_load_W_ = {};
+  if (hand) tools_[tool].hand = hand;
+  if (!hand) remove_tool(tool);
+  for (Tool& one : tools_) {
+    one.grasp_broke = false;
+    bodies_[one.body].weight_per_s2 = one.hand ? one.hand->stiffness_per_s2 : 0.0;
   }
-  advance_return();
+  advance_returns();
   dropped_.clear();
   for (BodyContact& contact : contacts_) {
     contact.stays = false;
@@ -232,9 +258,10 @@ void BodyWorld::begin(const std::optional<Hand>& hand) noexcept {
     bodies_[contact.a].touches = true;
     if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
   }
-  if (grasp_) {
-    wake(grasp_->body);
-    bodies_[0].touches = bodies_[grasp_->body].touches = true;
+  for (const Tool& one : tools_) {
+    if (!one.grasp) continue;
+    wake(one.grasp->body);
+    bodies_[one.body].touches = bodies_[one.grasp->body].touches = true;
   }
   for (BodyContact& contact : contacts_) contact.hold_m = held_gap_m(contact, kOpening * kClearance_m);
   move_contacts(time_s_, until_s_);
@@ -257,9 +284,11 @@ void BodyWorld::set_goal(Body& body) noexcept {
     body.step_s = 0.0;
     body.free = body.motion;
     body.X_goal = body.motion.X_WB;
-  } else if (&body == &bodies_[0]) {
+  } else if (body.tool != kNoTool) {
     body.free = body.motion;
-    body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, tool_goal(), body.fraction) : tool_goal();
+    if (body.weight_per_s2 == 0.0) return hold(body);
+    const Pose X_goal = tool_goal(tools_[body.tool]);
+    body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_goal, body.fraction) : X_goal;
   } else {
     body.step_s = body.fraction * dt_s_;
     if (body.step_s == 0.0) return hold(body);
@@ -306,7 +335,8 @@ void BodyWorld::find_islands() noexcept {
   for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = i;
   for (const BodyContact& c : contacts_)
     if (c.b != BodyContact::kFixed) bodies_[root_of(c.b)].island = root_of(c.a);
-  if (grasp_) bodies_[root_of(grasp_->body)].island = root_of(0);
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    if (is_held(i)) bodies_[root_of(i)].island = root_of(bodies_[i].mover);
   for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].island = root_of(i);
 }
 
@@ -339,20 +369,23 @@ void BodyWorld::solve_islands() noexcept {
 bool BodyWorld::solve_island(std::size_t island) noexcept {
   island_bodies_.clear();
   island_contacts_.clear();
+  bool holding = false;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     if (bodies_[i].island != island || bodies_[i].weight_per_s2 == 0.0) continue;
     bodies_[i].solved = true;
-    if (holds(i)) continue;  // moves with the tool
+    if (is_held(i)) {
+      holding = true;
+      continue;
+    }
     bodies_[i].block = island_bodies_.size();
     island_bodies_.push_back(i);
   }
-  const bool holding = grasp_ && bodies_[grasp_->body].island == island;
   for (std::size_t k = 0; k < contacts_.size(); ++k)
     if (bodies_[contacts_[k].a].island == island) island_contacts_.push_back(k);
   if (bodies_[island].fraction == 0.0) {
     for (const std::size_t k : island_contacts_) contacts_[k].force_W_N.setZero();
-    for (const std::size_t i : island_bodies_) hold(bodies_[i]);
-    if (holding) hold(bodies_[grasp_->body]);
+    for (Body& body : bodies_)
+      if (body.island == island && body.weight_per_s2 > 0.0) hold(body);
     return true;
   }
   if (island_contacts_.empty() && !holding) {
@@ -370,8 +403,8 @@ bool BodyWorld::solve_island(std::size_t island) noexcept {
   for (int k = 0; k < kNewtonSteps; ++k)
     if (newton_step(Friction::none)) break;
   if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
-  for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].motion.X_WB;
-  if (holding) bodies_[grasp_->body].X_WQ = bodies_[grasp_->body].motion.X_WB;
+  for (Body& body : bodies_)
+    if (body.island == island && body.weight_per_s2 > 0.0) body.X_WQ = body.motion.X_WB;
   return false;
 }
 
@@ -381,9 +414,15 @@ ContactGeometry BodyWorld::geometry(const BodyContact& contact) const noexcept {
 }
 
 /// The pose at which a contact acts on a body: half way for a free body, so that the contact does the work of
-/// its gap, METHOD (103); q for the tool, whose wrench is the gradient at q.
+/// its gap, METHOD (103); q for a tool, whose wrench is the gradient at q.
 Pose BodyWorld::acting_pose(std::size_t body) const noexcept {
-  return body == 0 ? bodies_[0].X_WQ : half_way(body);
+  return is_tool(body) ? bodies_[body].X_WQ : half_way(body);
+}
+
+/// The pose of its mover at which what acts on a held body acts.
+Pose BodyWorld::acting_pose_of_mover(std::size_t body) const noexcept {
+  const std::size_t mover = bodies_[body].mover;
+  return is_tool(body) ? bodies_[mover].X_WQ : half_way(mover);
 }
 
 Pose BodyWorld::half_way(std::size_t body) const noexcept {
@@ -433,9 +472,10 @@ FrictionCone BodyWorld::cone_of(const BodyContact& c, Friction friction) const n
     cone.s_m = c.mu * c.slip_m;
   }
   const auto set_block = [&](std::size_t i, double sign, std::size_t& block, FrictionCone::Block& D) {
-    const Body& body = bodies_[mover_of(i)];
-    const Pose X_WB = holds(i) ? half_way(0) : acting_pose(i);
-    const Vector3d arm_m = holds(i) ? arm_of_held(at.point_W_m) : Vector3d(at.point_W_m - X_WB.translation_m);
+    const Body& body = bodies_[bodies_[i].mover];
+    const Pose X_WB = is_held(i) ? acting_pose_of_mover(i) : acting_pose(i);
+    const Vector3d arm_m =
+        is_held(i) ? arm_of_held(i, at.point_W_m) : Vector3d(at.point_W_m - X_WB.translation_m);
     block = body.block;
     FrictionCone::Block moved;
     moved << sign * Matrix3d::Identity(), -sign * hat(arm_m) * X_WB.rotation.toRotationMatrix();
@@ -477,9 +517,9 @@ Vector6d BodyWorld::descent(std::size_t i) noexcept {
   Body& body = bodies_[i];
   Vector6d gradient = pull_gradient(body, body.X_goal);
   Matrix6d metric = metric_of(body);
-  const bool holding = i == 0 && grasp_;
-  if (holding) add_held(gradient, metric);
-  if (i != 0 || !root_with_curvature(metric)) {
+  const bool holding = moves_others(i);
+  if (holding) add_held(i, gradient, metric);
+  if (!is_tool(i) || !root_with_curvature(i, metric)) {
     if (holding) {
       body.root = metric.llt().matrixU();
     } else {
@@ -495,25 +535,26 @@ Vector6d BodyWorld::descent(std::size_t i) noexcept {
 /// The root of the tool's metric less the curvature of its gaps times their loads, METHOD (113). Its loads
 /// and levers are large against its spring, so without the curvature Newton's method converges slowly or not
 /// at all. Returns false if that is not positive definite, also with the gradients of the gaps added, (40).
-bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
+bool BodyWorld::root_with_curvature(std::size_t mover, const Matrix6d& metric) noexcept {
   Matrix6d W = metric, across = Matrix6d::Zero();
   for (const std::size_t k : island_contacts_) {
     const BodyContact& c = contacts_[k];
-    const bool of_tool = moves_with_tool(c.a);
-    if (of_tool == (c.b != BodyContact::kFixed && moves_with_tool(c.b))) continue;
+    const bool of_tool = moves_with(c.a, mover);
+    if (of_tool == moves_with(c.b, mover)) continue;
     const double load_N = c.force_W_N.dot(geometry(c).n_W);
     if (!(load_N > 0.0)) continue;
-    const Vector6d gradient = gap_gradient(c, Vector6d::Zero());
+    const Vector6d gradient = gap_gradient(mover, c, Vector6d::Zero());
     across += gradient * gradient.transpose();
     Matrix6d curvature;
     for (int axis = 0; axis < 6; ++axis) {
       const Vector6d step = kDifference * Vector6d::Unit(axis);
-      curvature.col(axis) = (gap_gradient(c, step) - gap_gradient(c, -step)) / (2.0 * kDifference);
+      curvature.col(axis) =
+          (gap_gradient(mover, c, step) - gap_gradient(mover, c, -step)) / (2.0 * kDifference);
     }
     W -= 0.5 * load_N * (curvature + curvature.transpose());
     // Friction, at its point of the tool: METHOD (24) with the normal in its place
     const ContactGeometry at = geometry(c);
-    const Pose X_TW = inverse(bodies_[0].X_WQ);
+    const Pose X_TW = inverse(bodies_[mover].X_WQ);
     const Vector3d friction_W_N = c.force_W_N - load_N * at.n_W;
     const Vector3d f = X_TW.rotation * (of_tool ? friction_W_N : -friction_W_N), p = X_TW * at.point_W_m;
     W.bottomRightCorner<3, 3>() -=
@@ -523,7 +564,7 @@ bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
   for (int attempt = 0; attempt < 4; ++attempt) {
     const Eigen::LLT<Matrix6d> llt(W + stiffening * across);
     if (llt.info() == Eigen::Success) {
-      bodies_[0].root = llt.matrixU();
+      bodies_[mover].root = llt.matrixU();
       return true;
     }
     stiffening = stiffening == 0.0 ? 4.0 * W.lpNorm<Eigen::Infinity>() : 30.0 * stiffening;
@@ -533,17 +574,18 @@ bool BodyWorld::root_with_curvature(const Matrix6d& metric) noexcept {
 
 /// Gradient of a gap of the tool, or of what it holds, in the tool's translation in W and its rotation in T,
 /// at a step from q.
-Vector6d BodyWorld::gap_gradient(const BodyContact& c, const Vector6d& step) const noexcept {
-  Pose X_WT = bodies_[0].X_WQ;
+Vector6d BodyWorld::gap_gradient(std::size_t mover, const BodyContact& c,
+                                 const Vector6d& step) const noexcept {
+  Pose X_WT = bodies_[mover].X_WQ;
   X_WT.translation_m += step.head<3>();
   X_WT.rotation = (X_WT.rotation * rotation_from(step.tail<3>())).normalized();
   const auto pose_of = [&](std::size_t i) {
     if (i == BodyContact::kFixed) return Pose{};
-    if (i == 0) return X_WT;
-    return holds(i) ? X_WT * grasp_->X_TB : bodies_[i].X_WQ;
+    if (i == mover) return X_WT;
+    return moves_with(i, mover) ? X_WT * bodies_[i].X_MB : bodies_[i].X_WQ;
   };
   const ContactGeometry at = geometry_of(c, pose_of(c.a), pose_of(c.b));
-  const Vector3d n_W = moves_with_tool(c.a) ? at.n_W : -at.n_W;
+  const Vector3d n_W = moves_with(c.a, mover) ? at.n_W : -at.n_W;
   Vector6d gradient;
   gradient << n_W, X_WT.rotation.conjugate() * (at.point_W_m - X_WT.translation_m).cross(n_W);
   return gradient;
@@ -568,11 +610,11 @@ bool BodyWorld::newton_step(Friction friction) noexcept {
     const Vector3d shift = step.head<3>(), turn = step.tail<3>();
     body.X_WQ.translation_m += shift;
     body.X_WQ.rotation = (body.X_WQ.rotation * rotation_from(turn)).normalized();
-    const double radius_m =
-        i == 0 && grasp_ ? body.radius_m + grasp_->X_TB.translation_m.norm() + bodies_[grasp_->body].radius_m
-                         : body.radius_m;
+    double radius_m = body.radius_m;
+    for (const Body& held : bodies_)
+      if (held.mover == i && &held != &body) radius_m += held.X_MB.translation_m.norm() + held.radius_m;
     change_m = std::max(shift.norm() + radius_m * turn.norm(), change_m);
-    if (i == 0 && grasp_) move_held();
+    if (is_tool(i)) move_held(i);
   }
   for (std::size_t k = 0; k < island_contacts_.size(); ++k) {
     BodyContact& contact = contacts_[island_contacts_[k]];
@@ -694,7 +736,7 @@ void BodyWorld::wake(std::size_t body) noexcept {
   }
 }
 
-/// Puts the islands to sleep whose bodies have all been calm, and which neither the tool nor an obstacle that
+/// Puts the islands to sleep whose bodies have all been calm, and which neither a tool nor an obstacle that
 /// moves touches.
 void BodyWorld::fall_asleep() noexcept {
   find_islands();
@@ -704,7 +746,7 @@ void BodyWorld::fall_asleep() noexcept {
     const bool calm = body.touches && speed_m_per_s < kCalmSpeed_m_per_s;
     body.calm_steps = calm ? std::min<std::uint16_t>(body.calm_steps + 1, kCalmSteps) : std::uint16_t{0};
   }
-  bodies_[0].calm_steps = 0;
+  for (const Tool& tool : tools_) bodies_[tool.body].calm_steps = 0;
   for (const BodyContact& c : contacts_)
     if (c.b == BodyContact::kFixed && pair_of(c).scene().has_moving_obstacles()) bodies_[c.a].calm_steps = 0;
   for (std::size_t island = 0; island < bodies_.size(); ++island) {
@@ -789,26 +831,33 @@ void BodyWorld::take_back() noexcept {
   }
   contacts_ = contacts_before_;  // equal capacities: no allocation
   time_s_ = time_before_s_;
-  grasp_ = grasp_before_;
-  return_ = return_before_;
-  tool_load_W_ = tool_load_before_W_;
+  tools_ = tools_before_;
   tool_was_moved_ = false;
+  find_movers();
 }
 
 /// A sweep from an admissible start that meets nothing ends at an admissible pose. The tool rests on it, and
 /// the bodies move from where they were to where they are.
-bool BodyWorld::admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s) noexcept {
+bool BodyWorld::admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s,
+                            std::size_t tool) noexcept {
+  const std::size_t own = tools_[tool].body;
+  const BodyPath rest = {X_WT, X_WT};
   VisitBudget budget{settings_.node_visits};
   return std::all_of(pairs_.begin(), pairs_.end(), [&](const auto& pair) {
-    if (pair->a() != 0) return true;
-    BodyPath other;
-    if (!pair->is_fixed()) other = {X_WB_then[pair->b() - 1], bodies_[pair->b()].motion.X_WB};
+    if (pair->a() != own && pair->b() != own) return true;
+    BodyPath path;
+    if (!pair->is_fixed()) {
+      const std::size_t other = pair->a() == own ? pair->b() : pair->a();
+      if (is_tool(other) && !has_hand(bodies_[other].tool)) return true;
+      path = {X_WB_then[place_among_others(other)], bodies_[other].motion.X_WB};
+    }
     const bool moved = pair->is_fixed() ? pair->scene().has_moving_obstacles() && then_s != time_s_
-                                        : !same_bits(other.start, other.end);
-    const BodyPath tool = {X_WT, X_WT};
-    if (!moved || !pair->is_near(tool, other)) return true;
+                                        : !same_bits(path.start, path.end);
+    const BodyPath& path_a = pair->a() == own ? rest : path;
+    const BodyPath& path_b = pair->a() == own ? path : rest;
+    if (!moved || !pair->is_near(path_a, path_b)) return true;
     const SweepQuery::SweepResult found =
-        pair->sweep(tool, other, kMinClearance * kClearance_m, budget, {then_s, time_s_});
+        pair->sweep(path_a, path_b, kMinClearance * kClearance_m, budget, {then_s, time_s_});
     return found.complete && !found.overlaps && found.contacts.empty();
   });
 }
@@ -824,19 +873,24 @@ void BodyWorld::hold_all() noexcept {
 }
 
 /// Applies the impulses of all contacts to the motions without contact, METHOD (109), and adds up the work on
-/// the tool, METHOD (111).
-void BodyWorld::apply_impulses() noexcept {
-  work_on_tool_J_ = 0.0;
+/// the tools, METHOD (111).
+void BodyWorld::apply_impulses(std::size_t named_tool) noexcept {
+  for (std::size_t tool = 0; tool < tools_.size(); ++tool) begin_work(tools_[tool], tool == named_tool);
   for (BodyContact& c : contacts_) {
     if (bodies_[c.a].asleep) continue;
     const ContactGeometry at = acting_geometry(c);
     c.point_W_m = at.point_W_m;
     c.normal_W = at.n_W;
     c.slip_m = slip_m(c, at).norm();
-    if (c.a == 0)  // finish_grasp() adds the work of a held body
-      work_on_tool_J_ += 0.5 * (c.last_force_W_N + c.force_W_N).dot(other_displacement_m(c, at.point_W_m));
+    // finish_grasps() adds the work of held bodies.
+    if (is_tool(c.a))
+      tools_[bodies_[c.a].tool].work_J +=
+          0.5 * (c.last_force_W_N + c.force_W_N).dot(other_displacement_m(c, at.point_W_m));
+    if (c.b != BodyContact::kFixed && is_tool(c.b))
+      tools_[bodies_[c.b].tool].work_J -=
+          0.5 * (c.last_force_W_N + c.force_W_N).dot(displacement_m(c.a, at.point_W_m));
     const auto push = [&](std::size_t i, double sign) {
-      if (i == BodyContact::kFixed || moves_with_tool(i)) return;
+      if (i == BodyContact::kFixed || is_tool(i) || is_held(i)) return;
       Body& body = bodies_[i];
       const Vector3d impulse = sign * body.step_s * c.force_W_N;
       body.free.velocity_W_m_per_s += impulse / body.M.mass_kg;
@@ -852,6 +906,12 @@ void BodyWorld::apply_impulses() noexcept {
   }
 }
 
+/// work_J adds up over the steps that do not name the tool. The step that names it completes the sum.
+void BodyWorld::begin_work(Tool& tool, bool named) noexcept {
+  if (tool.work_complete) tool.work_J = 0.0;
+  tool.work_complete = named;
+}
+
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.
 void BodyWorld::prefetch() noexcept {
   const auto still = [&](std::size_t i) { return i == BodyContact::kFixed || bodies_[i].asleep; };
@@ -862,8 +922,8 @@ void BodyWorld::prefetch() noexcept {
       if (i == BodyContact::kFixed) return BodyPath{};
       const BodyMotion& motion = bodies_[i].motion;
       if (bodies_[i].asleep) return BodyPath{motion.X_WB, motion.X_WB};
-      return BodyPath{motion.X_WB, i == 0
-                                       ? bodies_[0].X_goal
+      return BodyPath{motion.X_WB, is_tool(i)
+                                       ? bodies_[i].X_goal
                                        : moved_freely(bodies_[i].M, motion, bodies_[i].forces, dt_s_).X_WB};
     };
     const BodyPath path_a = next(pair->a()), path_b = next(pair->b());

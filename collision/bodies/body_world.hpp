@@ -23,17 +23,19 @@ namespace wrenchd {
 /// section 15, of the hand's pose and of the motions without contact onto the poses in which nothing
 /// overlaps.
 ///
-/// Body 0 is the tool. It takes part in steps with a hand; free bodies are 1, 2, ... No step ends with an
-/// overlap, and no body passes through another. If the work limit of a step is reached, bodies stay where
-/// they were.
+/// Body 0 is the tool of the first hand; free bodies are 1, 2, ... A body with of_hand is the tool of a
+/// second hand. Tools are numbered in this order, from 0. A tool takes part in steps if its hand has a pose.
+/// No step ends with an overlap, and no body passes through another. If the work limit of a step is reached,
+/// bodies stay where they were.
 ///
-/// A body at rest falls asleep with all bodies that a chain of contacts connects it to, unless the tool or an
+/// A body at rest falls asleep with all bodies that a chain of contacts connects it to, unless a tool or an
 /// obstacle that moves is among them. It wakes when something touches one of them.
 ///
 /// The constructor allocates all memory. One object serves one thread.
 class BodyWorld {
  public:
-  static constexpr std::size_t kMaxBodies = 33;  ///< with the tool
+  static constexpr std::size_t kMaxBodies = 33;  ///< with the tools
+  static constexpr std::size_t kMaxTools = 2;
   static constexpr std::size_t kMaxContacts = 1024;
   static constexpr double kClearance_m = 1e-9;  ///< gap at which contacts are held [m]
 
@@ -59,8 +61,8 @@ class BodyWorld {
   };
 
   /// The scene gives the tool and the fixed obstacles, and must outlive this object; it has no contacts by
-  /// planes of convex bodies. Throws std::invalid_argument if there are too many bodies. Not RT-safe:
-  /// allocates.
+  /// planes of convex bodies. Throws std::invalid_argument if there are too many bodies or tools. Not
+  /// RT-safe: allocates.
   BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Settings& settings);
 
   /// Places a body. Its pose must be admissible. A grasp ends, unless its body still is where the tool holds
@@ -68,25 +70,31 @@ class BodyWorld {
   void place(std::size_t body, const BodyMotion& motion) noexcept;
 
   /// Moves all bodies for dt_s [s], and the obstacles that move to their poses at scene time until_s [s].
-  /// Without a hand the tool takes no part. RT-safe.
-  Status step(const std::optional<Hand>& hand, double dt_s, double until_s) noexcept;
+  /// hand: of this tool; without a hand the tool takes no part. The hand of another tool stays as it was in
+  /// the last step that named it. RT-safe.
+  Status step(const std::optional<Hand>& hand, double dt_s, double until_s, std::size_t tool = 0) noexcept;
   Status step(const std::optional<Hand>& hand, double dt_s) noexcept {
     return step(hand, dt_s, time_s_ + dt_s);
   }
-  /// Joins the tool to the body that it presses on most. Returns false if it touches no body, or holds one.
+  /// Puts a tool into the world at a pose that admits_tool(). The steps of another hand then find it there.
   /// RT-safe.
-  bool grasp() noexcept;
+  void enter_tool(std::size_t tool, const Pose& X_WT) noexcept;
+  /// Takes a tool out of the world until it enters, or a step names its hand. It lets go. RT-safe.
+  void remove_tool(std::size_t tool) noexcept;
+  /// Joins the tool to the body that it presses on most. Returns false if it touches no body, or holds one.
+  /// Two tools may hold one body. RT-safe.
+  bool grasp(std::size_t tool = 0) noexcept;
   /// Lets go of the body that the tool holds. The tool then returns to the hand's pose without a jump.
   /// RT-safe.
-  void let_go() noexcept;
+  void let_go(std::size_t tool = 0) noexcept;
   /// Undoes the last step. The next step then is another attempt at the same one. RT-safe.
   void take_back() noexcept;
   /// Sets the scene time of the obstacle poses at the start of the next step. RT-safe.
   void set_time(double time_s) noexcept { time_s_ = time_s; }
 
   /// True if a step without the bodies has the same answer: they sleep, and the tool touches none of them on
-  /// the way to the hand's pose X_WP. False in a world where the tool has friction, or obstacles move.
-  /// RT-safe.
+  /// the way to the hand's pose X_WP. False in a world where the tool has friction, obstacles move, or two
+  /// hands act. RT-safe.
   bool bodies_are_out_of_reach(const Pose& X_WP) const noexcept;
   /// Replaces a step if bodies_are_out_of_reach(): takes the tool pose X_WT that another proxy found, and
   /// scene time until_s [s]. RT-safe.
@@ -95,31 +103,45 @@ class BodyWorld {
   bool tool_was_moved() const noexcept { return tool_was_moved_; }
 
   /// True if the tool may enter at X_WT. It was admissible there with the bodies at X_WB_then and the
-  /// obstacles at then_s; nothing has moved into it since. RT-safe.
-  bool admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s) noexcept;
+  /// obstacles at then_s; nothing has moved into it since. X_WB_then: of all other bodies, by their numbers.
+  /// RT-safe.
+  bool admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s,
+                   std::size_t tool = 0) noexcept;
 
-  std::size_t body_count() const noexcept { return bodies_.size(); }  ///< with the tool
+  std::size_t body_count() const noexcept { return bodies_.size(); }  ///< with the tools
+  std::size_t tool_count() const noexcept { return tools_.size(); }
+  /// The number of the body that is a tool.
+  std::size_t body_of(std::size_t tool) const noexcept { return tools_[tool].body; }
+  /// True if a tool takes part in steps.
+  bool has_hand(std::size_t tool) const noexcept { return tools_[tool].hand.has_value(); }
+  /// The place of a body in a list of all bodies but one tool: the free bodies first, then the other tool.
+  std::size_t place_among_others(std::size_t body) const noexcept {
+    return is_tool(body) ? bodies_.size() - 2 : body - 1;
+  }
   const BodyMotion& motion(std::size_t body) const noexcept { return bodies_[body].motion; }
   const Inertia& inertia(std::size_t body) const noexcept { return bodies_[body].M; }
   const std::string& name(std::size_t body) const noexcept { return bodies_[body].name; }
   /// The contacts that touch after the last step, with their forces.
   std::span<const BodyContact> contacts() const noexcept { return contacts_; }
   /// The body that the tool holds; 0 if it holds none.
-  std::size_t held_body() const noexcept { return grasp_ ? grasp_->body : 0; }
-  /// True if the last step ended a grasp whose load was larger than its strength.
-  bool grasp_broke() const noexcept { return grasp_broke_; }
+  std::size_t held_body(std::size_t tool = 0) const noexcept {
+    return tools_[tool].grasp ? tools_[tool].grasp->body : 0;
+  }
+  /// True if the last step ended a grasp of the tool whose load was larger than its strength.
+  bool grasp_broke(std::size_t tool = 0) const noexcept { return tools_[tool].grasp_broke; }
   /// The wrench of a held body, or of the return after a grasp, on the tool in the last step, about the
   /// tool's centre of mass, in axes of W.
-  const Wrench& tool_load_W() const noexcept { return tool_load_W_; }
+  const Wrench& tool_load_W(std::size_t tool = 0) const noexcept { return tools_[tool].load_W; }
   /// The wrench with which a pose attracts the tool at the end of the last step: minus the gradient of the
   /// energy law, about the tool's centre of mass, in axes of W. RT-safe.
-  Wrench pull_to(const Pose& X_goal) const noexcept;
+  Wrench pull_to(const Pose& X_goal, std::size_t tool = 0) const noexcept;
   /// Scene time [s]. It stands still in a step that holds all bodies, so that no obstacle moves into one.
   double time_s() const noexcept { return time_s_; }
   /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
   double last_change_m() const noexcept { return last_change_m_; }
-  /// Work of bodies and moving obstacles on the tool in the last step [J]: METHOD (111).
-  double work_on_tool_J() const noexcept { return work_on_tool_J_; }
+  /// Work of bodies, of the other tool and of moving obstacles on the tool [J], METHOD (111): in the last
+  /// step that named it, and in the steps of the other tool before.
+  double work_on_tool_J(std::size_t tool = 0) const noexcept { return tools_[tool].work_J; }
   /// The tool and the obstacles or the body of a contact, as the features of contact.contact number them.
   const Scene& scene_of(const BodyContact& contact) const noexcept { return pair_of(contact).scene(); }
   bool asleep(std::size_t body) const noexcept { return bodies_[body].asleep; }
@@ -129,6 +151,8 @@ class BodyWorld {
   double energy_J() const noexcept;
 
  private:
+  static constexpr std::size_t kNoTool = SIZE_MAX;
+
   struct Body {
     std::string name;
     Inertia M;
@@ -149,12 +173,29 @@ class BodyWorld {
     bool asleep = false;                   ///< rests until something touches its island
     std::uint16_t calm_steps = 0;          ///< consecutive steps in which it hardly moved
     std::size_t block = 0;                 ///< number of the body in the problem of its island
+    std::size_t tool = kNoTool;            ///< number of the tool that the body is
+    std::size_t mover = 0;                 ///< body whose unknowns move it: itself, or the tool that holds it
+    Pose X_MB;                             ///< its pose in the frame of the mover
     Matrix6d root = Matrix6d::Identity();  ///< upper triangular root of the metric at q
+  };
+
+  /// A tool that a hand leads. A step changes it.
+  struct Tool {
+    std::size_t body = 0;            ///< number of its body
+    std::optional<Hand> hand;        ///< of the last step that named the tool; empty: takes no part
+    std::optional<Grasp> grasp;      ///< empty: holds nothing
+    std::optional<ToolReturn> back;  ///< way back to the hand after a grasp; empty: is there
+    /// Loads on the tool about its centre of mass, in axes of W: of the held body and of the return; of the
+    /// held body alone.
+    Wrench load_W, grasp_load_W;
+    double work_J = 0.0;        ///< work on the tool: work_on_tool_J()
+    bool work_complete = true;  ///< the last step named the tool: the next one begins a new sum
+    bool grasp_broke = false;
   };
 
   enum class Friction : std::uint8_t { coulomb, frozen, none };
 
-  void begin(const std::optional<Hand>& hand) noexcept;
+  void begin(const std::optional<Hand>& hand, std::size_t tool) noexcept;
   void save() noexcept;
   void set_goal(Body& body) noexcept;
   double held_gap_m(const BodyContact& contact, double opening_m) const noexcept;
@@ -168,21 +209,29 @@ class BodyWorld {
   Vector6d descent(std::size_t body) noexcept;
   static Vector6d pull_gradient(const Body& body, const Pose& X_goal) noexcept;
   static Matrix6d metric_of(const Body& body) noexcept;
-  void add_held(Vector6d& gradient, Matrix6d& metric) const noexcept;
-  void move_held() noexcept;
-  bool holds(std::size_t body) const noexcept { return grasp_ && body == grasp_->body; }
-  /// The body whose unknowns move a body: the tool for the one that it holds.
-  std::size_t mover_of(std::size_t body) const noexcept { return holds(body) ? 0 : body; }
-  bool moves_with_tool(std::size_t body) const noexcept { return body == 0 || holds(body); }
-  bool joins(const BodyPair& pair) const noexcept { return pair.a() == 0 && holds(pair.b()); }
-  Vector3d arm_of_held(const Vector3d& point_W_m) const noexcept;
-  Wrench load_of_held() const noexcept;
-  Pose tool_goal() const noexcept;
+  void add_held(std::size_t mover, Vector6d& gradient, Matrix6d& metric) const noexcept;
+  void move_held(std::size_t mover) noexcept;
+  void find_movers() noexcept;
+  bool is_tool(std::size_t body) const noexcept { return bodies_[body].tool != kNoTool; }
+  bool is_held(std::size_t body) const noexcept { return bodies_[body].mover != body; }
+  bool moves_with(std::size_t body, std::size_t mover) const noexcept {
+    return body != BodyContact::kFixed && bodies_[body].mover == mover;
+  }
+  bool moves_others(std::size_t body) const noexcept;
+  bool joins(const BodyPair& pair) const noexcept {
+    return !pair.is_fixed() && bodies_[pair.a()].mover == bodies_[pair.b()].mover;
+  }
+  Pose acting_pose_of_mover(std::size_t body) const noexcept;
+  Vector3d arm_of_held(std::size_t body, const Vector3d& point_W_m) const noexcept;
+  Wrench load_of_held(const Tool& tool) const noexcept;
+  Wrench contacts_on(std::size_t body) const noexcept;
+  Pose tool_goal(const Tool& tool) const noexcept;
   void push_held() noexcept;
-  void finish_grasp() noexcept;
-  void advance_return() noexcept;
-  bool root_with_curvature(const Matrix6d& metric) noexcept;
-  Vector6d gap_gradient(const BodyContact& contact, const Vector6d& step) const noexcept;
+  void finish_grasps() noexcept;
+  static void begin_work(Tool& tool, bool named) noexcept;
+  void advance_returns() noexcept;
+  bool root_with_curvature(std::size_t mover, const Matrix6d& metric) noexcept;
+  Vector6d gap_gradient(std::size_t mover, const BodyContact& contact, const Vector6d& step) const noexcept;
   FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
   Vector3d displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept;
   Vector3d other_displacement_m(const BodyContact& contact, const Vector3d& point_W_m) const noexcept;
@@ -206,7 +255,7 @@ class BodyWorld {
   void shorten(const BodyPair& pair) noexcept;
   void hold(Body& body) noexcept;
   void hold_all() noexcept;
-  void apply_impulses() noexcept;
+  void apply_impulses(std::size_t named_tool) noexcept;
   void prefetch() noexcept;
   BodyPath path_of(std::size_t body) const noexcept;
 
@@ -223,24 +272,16 @@ class BodyWorld {
   std::vector<BodyState> bodies_before_;      ///< before the last step
   std::vector<BodyContact> contacts_before_;  ///< before the last step
   double time_before_s_ = 0.0;
-  std::optional<Grasp> grasp_, grasp_before_;
-  /// The way of the tool back to the hand after a grasp; empty if it is back. before: before the last step.
-  std::optional<ToolReturn> return_, return_before_;
-  /// Loads on the tool about its centre of mass, in axes of W: of the held body and of the return; before the
-  /// last step; of the held body alone.
-  Wrench tool_load_W_, tool_load_before_W_, grasp_load_W_;
-  bool grasp_broke_ = false;
+  std::vector<Tool> tools_, tools_before_;  ///< before: before the last step
   bool tool_was_moved_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   ConeProjection cones_;
   ConeProjection::Status cones_status_ = ConeProjection::Status::optimal;
-  Pose X_WP_;  ///< of the hand
   VisitBudget budget_;
   double time_s_ = 0.0;   ///< scene time of the obstacle poses
   double dt_s_ = 0.0;     ///< time that passes for the bodies in the step
   double until_s_ = 0.0;  ///< scene time of the obstacle poses at the end of the step
-  double work_on_tool_J_ = 0.0;
   double last_change_m_ = 0.0;
   std::uint32_t rounds_ = 0, solver_steps_ = 0;
 };

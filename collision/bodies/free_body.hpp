@@ -21,6 +21,7 @@ struct FreeBody {
   double friction = 0.5;
   double linear_damping_per_s = 0.0;
   double angular_damping_per_s = 0.0;
+  bool of_hand = false;                      ///< the tool of a second hand, which moves as that hand leads it
   std::shared_ptr<const MeshBvh> mesh = {};  ///< of body.mesh, for contacts; null: built where it is needed
 };
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -26,20 +27,18 @@ constexpr int kWarmUpTicks = 30;
 /// minimizes.
 void require_support_for_bodies(const Scene& scene, const Settings& settings) {
   if (scene.bodies().empty()) return;
+  const bool two_hands = scene.bodies().back().of_hand;
+  const std::string what = two_hands ? "two hands act in the scene" : "the scene has free bodies";
+  const std::string cure = two_hands ? "remove the [[hand]] table" : "remove the [[body]] tables";
   if (settings.rendering.method != Method::exact)
-    throw std::invalid_argument(
-        "the scene has free bodies, and only [rendering] method \"exact\" moves them; choose it, or remove "
-        "the "
-        "[[body]] tables");
+    throw std::invalid_argument(what + ", and only [rendering] method \"exact\" moves them; choose it, or " +
+                                cure);
   if (settings.wrench.law != SpringLaw::energy)
-    throw std::invalid_argument(
-        "the scene has free bodies, and only [wrench] law \"energy\" moves them; choose it, or remove the "
-        "[[body]] tables");
+    throw std::invalid_argument(what + ", and only [wrench] law \"energy\" moves them; choose it, or " +
+                                cure);
   if (settings.rendering.contacts == ContactBackend::cgal)
     throw std::invalid_argument(
-        "the scene has free bodies, and only [rendering] contacts \"native\" moves them; choose it, or "
-        "remove "
-        "the [[body]] tables");
+        what + ", and only [rendering] contacts \"native\" moves them; choose it, or " + cure);
 }
 
 /// FNV-1a over 64-bit words.
@@ -75,7 +74,8 @@ PenetrationDepth::Options proxy_options(const Scene& scene, const Settings& sett
 }  // namespace
 
 Rendering::Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
-                     std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer)
+                     std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer,
+                     const SharedTool& shared)
     : id_(id),
       scene_(std::move(scene)),
       proxy_initializer_(std::move(proxy_initializer)),
@@ -86,9 +86,12 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
       penetration_(*scene_, proxy_options(*scene_, settings)),
+      shares_world_(shared.world != nullptr),
       law_(gains_) {
   require_support_for_bodies(*scene_, settings);
-  if (!scene_->bodies().empty())
+  if (shares_world_)
+    bodies_.emplace(shared.world, shared.tool, *scene_);
+  else if (!scene_->bodies().empty())
     bodies_.emplace(*scene_, settings.rendering.friction.dynamic_coefficient, settings.rendering.grasp);
   invalidate_proxy();
 }
@@ -261,6 +264,7 @@ void Rendering::invalidate_proxy() noexcept {
   request_pending_ = false;
   has_initial_guess_ = starts_in_contact_ = false;
   penetration_.clear_history();
+  if (bodies_) bodies_->leave();
   depth_ = Penetration{};
   depth_.projection.status = ProjectionStatus::infeasible;
   F_T_ = Wrench{};

@@ -27,9 +27,11 @@ namespace wrenchd {
 class Rendering {
  public:
   /// id: number of the rendering in records; 0 is the rendering of the start. Throws std::invalid_argument if
-  /// method or law do not support the scene or if the gains give no valid spring. Not RT-safe: allocates.
+  /// method or law do not support the scene or if the gains give no valid spring. shared: the tool's place in
+  /// the world of two hands. Not RT-safe: allocates.
   Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
-            std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer);
+            std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer,
+            const SharedTool& shared = {});
 
   /// Executes all code of a tick near handle pose X_WH, which loads memory and caches, then invalidates the
   /// proxy. Not RT-safe: takes up to 50 ms and starts a thread.
@@ -50,6 +52,10 @@ class Rendering {
 
   /// Discards q, sets the wrench to zero and starts a proxy initialization in the next tick. RT-safe.
   void invalidate_proxy() noexcept;
+  /// In a world of two hands: the hand is gone, and its tool is in nobody's way. RT-safe.
+  void leave_shared_world() noexcept {
+    if (shares_world_) invalidate_proxy();
+  }
   /// Resets integral and derivative of the wrench law, for use after a gap of unknown length. RT-safe.
   void reset_law() noexcept { law_.reset(); }
   /// Starts the next proxy initialization near tool pose X_WT instead of p. Use it to keep the tool on that
@@ -123,6 +129,7 @@ class Rendering {
   PenetrationDepth penetration_;
   /// Follows the hand in a scene with bodies, unless they sleep out of reach; penetration_ does otherwise.
   std::optional<BodyProxy> bodies_;
+  bool shares_world_;
   WrenchLaw law_;
   LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.

@@ -45,6 +45,10 @@ class ServoLoop {
   /// Between two ticks only. RT-safe.
   void release(TimePoint now) noexcept;
 
+  /// Number of the free body that the tool holds, from 1 in the order of the scene; 0: none. Between two
+  /// ticks only. RT-safe.
+  std::size_t held_body() const noexcept { return renderer_.active().held_body(); }
+
   /// Where other threads put requests.
   RequestInbox& requests() noexcept { return requests_; }
   /// Where other threads read what the loop does.
