@@ -32,19 +32,6 @@ void set_file(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
   }
 }
 
-void merge_over(TomlNode::Table& table, TomlNode::Table parent) {
-  for (TomlEntry& inherited : parent) {
-    TomlEntry* own = find(table, inherited.key);
-    if (!own) {
-      table.push_back(std::move(inherited));
-      continue;
-    }
-    auto* own_table = std::get_if<TomlNode::Table>(&own->node.value);
-    auto* parent_table = std::get_if<TomlNode::Table>(&inherited.node.value);
-    if (own_table && parent_table) merge_over(*own_table, std::move(*parent_table));
-  }
-}
-
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   return a == b || (fs::equivalent(a, b, error) && !error);
@@ -86,6 +73,19 @@ fs::path parent_of(const std::string& name, const SourceLocation& place, const s
 }
 
 }  // namespace
+
+void merge_over(TomlNode::Table& table, TomlNode::Table parent) {
+  for (TomlEntry& inherited : parent) {
+    TomlEntry* own = find(table, inherited.key);
+    if (!own) {
+      table.push_back(std::move(inherited));
+      continue;
+    }
+    auto* own_table = std::get_if<TomlNode::Table>(&own->node.value);
+    auto* parent_table = std::get_if<TomlNode::Table>(&inherited.node.value);
+    if (own_table && parent_table) merge_over(*own_table, std::move(*parent_table));
+  }
+}
 
 TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vector<ConfigText>* texts) {
   std::vector<fs::path> chain = {file};

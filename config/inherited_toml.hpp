@@ -9,6 +9,9 @@
 
 namespace wrenchd {
 
+/// Adds to a table what only `parent` has. Tables merge key by key; every other value of `table` stays.
+void merge_over(TomlNode::Table& table, TomlNode::Table parent);
+
 /// Reads a profile and merges it over the profile that it names with `inherits = "NAME"`, recursively. Tables
 /// merge key by key; every other value, arrays included, replaces the inherited one. The result has no key
 /// `inherits`. Inherited values keep their file in their location.

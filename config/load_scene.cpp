@@ -190,7 +190,7 @@ TomlValue read_solid(TomlTable& table, const SceneReading& reading, ToolSettings
 }
 
 /// The mass may be in [tool] or at the top of the file.
-void read_tool(TomlTable& table, const SceneReading& reading, const TomlValue& top_mass) {
+void read_scene_tool(TomlTable& table, const SceneReading& reading, const TomlValue& top_mass) {
   SceneSettings& scene = reading.scene;
   const TomlValue mass = read_solid(table, reading, scene.tool);
   top_mass.number(scene.tool.mass_kg, kMass);
@@ -339,7 +339,7 @@ void read_scene(TomlTable& table, const SceneReading& reading) {
   SceneSettings& scene = reading.scene;
   TomlValue mass = table.optional("mass", "kg");
   table.optional("surface_tolerance_m").number(scene.surface_tolerance_m, kSurfaceTolerance_m);
-  table.mandatory("tool").table(read_tool, reading, mass);
+  table.mandatory("tool").table(read_scene_tool, reading, mass);
   for (const TomlValue& obstacle : table.optional("obstacle").elements("tables, each headed [[obstacle]]")) {
     obstacle.table(read_obstacle, reading, obstacle.name());
   }
@@ -359,6 +359,12 @@ void read_added(TomlTable& table, const SceneReading& reading) {
 }
 
 }  // namespace
+
+void read_tool(TomlTable& table, const fs::path& file, ToolSettings& tool) {
+  SceneSettings scene;
+  scene.file = file;
+  read_solid(table, SceneReading{scene, FileScope()}, tool);
+}
 
 void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene,
                   const FileScope& scope) {

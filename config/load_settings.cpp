@@ -19,18 +19,29 @@ void change_rendering(const TomlNode& changes, const fs::path& source, Settings&
   settings = std::move(changed);
 }
 
-Settings load_settings(const fs::path& file, const SearchPath& search) {
+Settings load_settings(const fs::path& file, const SearchPath& search, std::optional<SecondHand>* second) {
   std::string text = read_config_text(file);
-  Settings settings = load_settings(read_toml_text(text, file), file, search);
+  Settings settings = load_settings(read_toml_text(text, file), file, search, second);
+  if (second != nullptr && *second) (*second)->settings.text = text;
   settings.text = std::move(text);
   return settings;
 }
 
-Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search) {
+Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search,
+                       std::optional<SecondHand>* second) {
   Settings settings;
   settings.file = file;
-  read_toml_node(file, tree, read_settings, SettingContext{search, file}, settings);
-  settings.hand_script_text = load_hand_script(settings.simulation.hand_script, settings.simulation);
+  std::optional<SecondHand> other;
+  const auto read = [&](TomlTable& root) {
+    const SettingContext context{search, file};
+    read_settings(root, context, settings);
+    other = read_second_hand(root, context, settings);
+  };
+  read_toml_node(file, tree, read);
+  for (Settings* hand : {&settings, other ? &other->settings : nullptr})
+    if (hand != nullptr)
+      hand->hand_script_text = load_hand_script(hand->simulation.hand_script, hand->simulation);
+  if (second != nullptr) *second = std::move(other);
   return settings;
 }
 

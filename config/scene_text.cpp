@@ -127,7 +127,7 @@ std::string free_body(const BodySettings& body) {
 
 std::string scene_text(const SceneSettings& scene, double now_s) {
   std::string text =
-      "# The scene as clients of wrenchd have changed it, at scene time " + to_text(now_s) +
+      "# The scene as wrenchd renders it, at scene time " + to_text(now_s) +
       " s.\nsurface_tolerance_m = " + to_text(scene.surface_tolerance_m) + "\n" +
       (scene.bodies.empty() ? "" : "gravity_m_per_s2 = " + array(scene.gravity_W_m_per_s2) + "\n") +
       "\n[tool]\n" + tool_lines(scene.tool);

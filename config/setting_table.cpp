@@ -38,6 +38,7 @@ bool read_file_name(const TomlValue& value, const Context& context, fs::path& na
 
 bool read_profile(const TomlValue& value, const Context& context, DeviceSettings& device) {
   const bool good = value.text(device.profile);
+  device.profile_file.clear();
   if (device.profile == kAnyProfile) return good;
   device.profile_file = profile_file(device.profile);
   return find_file(value, context, device.profile_file) && good;
@@ -331,20 +332,21 @@ void check_rendering(const SectionValues& values, Settings& settings) {
 struct Section {
   std::string_view name;
   bool read_if_absent;  ///< for defaults that need a lookup
+  bool of_hand;         ///< each hand may have its own values
   void (*check)(const SectionValues& values, Settings& settings);
 };
-constexpr std::array<Section, 12> kSections = {{{"", true, nullptr},
-                                                {"device", true, nullptr},
-                                                {"servo", false, nullptr},
-                                                {"rendering", false, check_rendering},
-                                                {"rendering.friction", false, check_friction},
-                                                {"rendering.grasp", false, nullptr},
-                                                {"wrench", false, nullptr},
-                                                {"limits", false, nullptr},
-                                                {"simulation", true, nullptr},
-                                                {"recording", false, nullptr},
-                                                {"control", false, nullptr},
-                                                {"view", false, nullptr}}};
+constexpr std::array<Section, 12> kSections = {{{"", true, false, nullptr},
+                                                {"device", true, true, nullptr},
+                                                {"servo", false, false, nullptr},
+                                                {"rendering", false, false, check_rendering},
+                                                {"rendering.friction", false, false, check_friction},
+                                                {"rendering.grasp", false, false, nullptr},
+                                                {"wrench", false, false, nullptr},
+                                                {"limits", false, true, nullptr},
+                                                {"simulation", true, true, nullptr},
+                                                {"recording", false, false, nullptr},
+                                                {"control", false, false, nullptr},
+                                                {"view", false, false, nullptr}}};
 
 const Section& section_named(std::string_view name) {
   return *std::find_if(kSections.begin(), kSections.end(), [&](const Section& s) { return s.name == name; });
@@ -361,29 +363,38 @@ std::string_view key_in(std::string_view parent, std::string_view section) {
   return key.find('.') == std::string_view::npos ? key : std::string_view{};
 }
 
-void read_section(TomlTable& table, const Section& section, const Context& context, Settings& settings);
+/// What reading does for a key that is absent.
+enum class Absent : std::uint8_t {
+  look_up,  ///< searches the file that a default names
+  keep,     ///< keeps the value, which was read before
+};
+
+void read_section(TomlTable& table, const Section& section, const Context& context, Absent absent,
+                  Settings& settings);
 
 TomlValue read_subsection(TomlTable& parent, std::string_view key, const Section& section,
-                          const Context& context, Settings& settings) {
+                          const Context& context, Absent absent, Settings& settings) {
   TomlValue value = parent.optional(key);
-  const auto read = [&](TomlTable& table) { read_section(table, section, context, settings); };
-  if (section.read_if_absent)
+  const auto read = [&](TomlTable& table) { read_section(table, section, context, absent, settings); };
+  if (section.read_if_absent && absent == Absent::look_up)
     value.table_or_empty(read);
   else
     value.table(read);
   return value;
 }
 
-void read_section(TomlTable& table, const Section& section, const Context& context, Settings& settings) {
+void read_section(TomlTable& table, const Section& section, const Context& context, Absent absent,
+                  Settings& settings) {
   SectionValues values;
   for (const Setting& setting : kTable) {
     if (setting.section != section.name || setting.read == nullptr) continue;
     const TomlValue value = table.optional(setting.key, setting.unit);
-    values.add(setting.key, value, setting.read(value, context, settings));
+    const bool skipped = !value && absent == Absent::keep;
+    values.add(setting.key, value, !skipped && setting.read(value, context, settings));
   }
   for (const Section& inner : kSections)
     if (const std::string_view key = key_in(section.name, inner.name); !key.empty())
-      values.add(key, read_subsection(table, key, inner, context, settings), true);
+      values.add(key, read_subsection(table, key, inner, context, absent, settings), true);
   if (section.check != nullptr) section.check(values, settings);
 }
 
@@ -399,12 +410,22 @@ std::span<const Setting> setting_table() noexcept {
 }
 
 void read_settings(TomlTable& root, const SettingContext& context, Settings& settings) {
-  read_section(root, section_named(""), context, settings);
+  read_section(root, section_named(""), context, Absent::look_up, settings);
+}
+
+void read_hand_settings(TomlTable& hand, const SettingContext& context, Settings& settings) {
+  for (const Section& section : kSections) {
+    if (section.name.empty() || section.name.find('.') != std::string_view::npos) continue;
+    if (section.of_hand)
+      read_subsection(hand, section.name, section, context, Absent::keep, settings);
+    else if (const TomlValue common = hand.optional(section.name))
+      common.reject("applies to both hands; state it outside of [[hand]]");
+  }
 }
 
 void read_rendering_settings(TomlTable& root, const SettingContext& context, Settings& settings) {
   for (const std::string_view name : {"rendering", "wrench"})
-    read_subsection(root, name, section_named(name), context, settings);
+    read_subsection(root, name, section_named(name), context, Absent::look_up, settings);
 }
 
 }  // namespace wrenchd

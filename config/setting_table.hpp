@@ -54,6 +54,10 @@ std::span<const Setting> setting_table() noexcept;
 /// other.
 void read_settings(TomlTable& root, const SettingContext& context, Settings& settings);
 
+/// Reads the sections that each hand has for itself, [device], [limits] and [simulation], over the values
+/// that `settings` has. Rejects the sections that apply to both hands. hand: a [[hand]] table.
+void read_hand_settings(TomlTable& hand, const SettingContext& context, Settings& settings);
+
 /// Reads [rendering] and [wrench] only.
 void read_rendering_settings(TomlTable& root, const SettingContext& context, Settings& settings);
 

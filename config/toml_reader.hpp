@@ -49,6 +49,8 @@ class TomlValue {
   bool is_none(std::string_view key) const noexcept;
   /// True if the value comes from an inherited profile.
   bool is_inherited() const noexcept { return location_.file != nullptr; }
+  /// Location of the value; of its table if the value is absent.
+  const SourceLocation& location() const noexcept { return location_; }
   const std::string& name() const noexcept { return name_; }  ///< dotted name, as in "obstacle[0].half_space"
 
   bool number(double& out, Range range) const;  ///< accepts an integer

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/daemon_run.hpp"
 
+#include <array>
 #include <exception>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -22,9 +24,12 @@
 #include "daemon/control/wrench_methods.hpp"
 #include "daemon/device_run.hpp"
 #include "daemon/device_start.hpp"
+#include "daemon/hand_file.hpp"
+#include "daemon/log_prefix.hpp"
 #include "daemon/output_queue.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/recording/recordings.hpp"
+#include "daemon/servo_thread.hpp"
 #include "daemon/standard_streams.hpp"
 #include "daemon/thread_guard.hpp"
 #include "daemon/version.hpp"
@@ -49,7 +54,7 @@ ReloadResult reload_all(Runtime& runtime, EventFeed& feed, const RunContext& con
   };
   const Notification notification(context.service);
   return reload_config(runtime.reconfigurator(), feed,
-                       [&context] { return load_run_config(context.options); });
+                       [&context] { return load_run_configs(context.options).front(); });
 }
 
 /// Opens the control socket. Returns null if the configuration asks for none, in virtual time, and if another
@@ -57,7 +62,9 @@ ReloadResult reload_all(Runtime& runtime, EventFeed& feed, const RunContext& con
 /// the simulated device in this process; null if there is none.
 std::unique_ptr<ControlInterface> open_control(Runtime& runtime, EventFeed& feed, Recordings& recordings,
                                                DeviceInHand* hand, const RunContext& context) {
-  const SocketPath socket = choose_socket_path(context.options.control, runtime.config().settings.control);
+  const RunConfig& config = runtime.config();
+  SocketPath socket = choose_socket_path(context.options.control, config.settings.control);
+  socket.path = file_of_hand(socket.path, config.hand());
   if (socket.path.empty() || context.options.virtual_time) return nullptr;
   auto control = std::make_unique<ControlInterface>(runtime, feed);
   try {
@@ -65,8 +72,8 @@ std::unique_ptr<ControlInterface> open_control(Runtime& runtime, EventFeed& feed
     add_scene_methods(control->methods(), runtime.reconfigurator(),
                       [&] { return reload_all(runtime, feed, context); });
     add_record_methods(control->methods(), recordings);
-    add_hand_methods(control->methods(), hand, runtime.config());
-    add_wrench_methods(control->methods(), runtime.loop(), feed, runtime.config());
+    add_hand_methods(control->methods(), hand, config);
+    add_wrench_methods(control->methods(), runtime.loop(), feed, config);
     control->status_sections()["recording"] = [&recordings] { return recording_json(recordings); };
     control->open(socket.path);
     spdlog::info("control socket: {}", socket.path.string());
@@ -112,39 +119,102 @@ LiveView::Print live_print(const Options& options, OutputQueue& queue) {
   };
 }
 
-using RunLoop = std::function<Fault(Runtime&, Recordings&, LiveView&)>;
+/// The device of a hand and the link to it.
+struct HandDevice {
+  LoopbackScript script = {};  ///< of a simulated device
+  std::unique_ptr<ReportLink> link = {};
+  DeviceInHand* simulated = nullptr;          ///< null: a real device, or one in another process
+  const ReconnectingLink* plugged = nullptr;  ///< null: a simulated device
+};
 
-/// Builds the runtime on its link, opens recordings and control socket, and runs the loop by `run_loop`.
-/// hand: the simulated device at the other end of the link, in this process; null if there is none.
-Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link, DeviceInHand* hand,
-                  Clock& clock, const RunLoop& run_loop) {
-  const bool virtual_time = context.options.virtual_time;
-  Runtime runtime(std::move(config), link, clock,
-                  virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background,
-                  MeshLoader(cache_directory(), [](const std::string& text) { spdlog::info("{}", text); }));
-  const SignalTarget signal_target(runtime.loop());
-  const Settings& settings = runtime.config().settings;
+/// Returns the simulated device with the faults of the script.
+std::unique_ptr<SimulatedLink> make_scripted_link(const RunConfig& config, const LoopbackScript& script,
+                                                  Clock& clock) {
+  auto link = make_simulated_link(config.profile, config.settings.simulation, clock);
+  for (const SimulatedFault& fault : script.faults) try {
+      link->device().inject(fault);
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(script.file.string() + ": " + error.what());
+    }
+  return link;
+}
+
+/// --link-fd and --loopback-script are for the first hand.
+HandDevice make_device(const RunConfig& config, const RunContext& context, Clock& clock) {
+  HandDevice device;
+  const Options& options = context.options;
+  const bool in_other_process = options.link_fd >= 0 && !config.is_second;
+  if (!options.script.empty() && !config.is_second) device.script = load_loopback_script(options.script);
+  if (in_other_process) {
+    device.link = std::make_unique<SocketLink>(options.link_fd, link_settings(config));
+  } else if (config.simulated) {
+    auto link = make_scripted_link(config, device.script, clock);
+    device.simulated = &link->device();
+    device.link = std::move(link);
+  } else {
+    auto link = make_plugged_link(config);
+    device.plugged = link.get();
+    device.link = std::move(link);
+  }
+  return device;
+}
+
+/// One hand: its device, and everything that is built from its configuration.
+struct Hand {
+  Hand(RunConfig config, const RunContext& run_context, Clock& clock)
+      : context(run_context),
+        device(make_device(config, context, clock)),
+        runtime(std::move(config), *device.link, clock,
+                context.options.virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background,
+                MeshLoader(cache_directory(), [](const std::string& text) { spdlog::info("{}", text); })) {}
+
+  RunContext context;
+  HandDevice device;
+  Runtime runtime;
+};
+
+std::unique_ptr<Hand> make_hand(RunConfig config, const RunContext& context, Clock& clock) {
+  const LogPrefix prefix(config.hand());
+  return std::make_unique<Hand>(std::move(config), context, clock);
+}
+
+using RunLoop = std::function<Fault(Recordings&, LiveView&)>;
+
+void log_start(const Runtime& runtime) {
   for (const std::string& remark : runtime.mesh_remarks()) spdlog::warn("{}", remark);
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                runtime.config().profile.name, runtime.scene().tool().hull.vertices_T_m.size(),
-               runtime.scene().obstacle_count(), settings.servo.rate_Hz);
+               runtime.scene().obstacle_count(), runtime.config().settings.servo.rate_Hz);
+}
+
+/// Opens recordings and control socket of a hand, and runs its loop by `run_loop`.
+Fault run_hand(Hand& hand, Clock& clock, const RunLoop& run_loop) {
+  const RunContext& context = hand.context;
+  const bool virtual_time = context.options.virtual_time;
+  Runtime& runtime = hand.runtime;
+  const RunConfig& config = runtime.config();
+  const LogPrefix prefix(config.hand());
+  const SignalTarget signal_target(runtime.loop());
+  log_start(runtime);
   OutputQueue live_output;
-  LiveView view(live_print(context.options, live_output), isatty(STDOUT_FILENO) != 0,
-                runtime.config().profile);
+  LiveView view(live_print(context.options, live_output), isatty(STDOUT_FILENO) != 0, config.profile,
+                config.hand());
   Fault fault = Fault::none;
   double run_s = 0.0;
   {
-    EventFeed feed(runtime.loop());
+    EventFeed feed(runtime.loop(), config.hand());
     Recordings recordings(runtime, feed, clock,
                           virtual_time ? Recordings::Pace::manual : Recordings::Pace::threads);
-    if (!settings.recording.file.empty()) recordings.start_file(settings.recording.file);
-    const auto control = open_control(runtime, feed, recordings, hand, context);
-    const ReloadThread reload_thread(runtime, feed, context);
+    const std::filesystem::path& recorded = config.settings.recording.file;
+    if (!recorded.empty()) recordings.start_file(recorded);
+    const auto control = open_control(runtime, feed, recordings, hand.device.simulated, context);
+    std::optional<ReloadThread> reload_thread;
+    if (!config.is_second) reload_thread.emplace(runtime, feed, context);
     const TimePoint start = clock.now();
-    fault = run_loop(runtime, recordings, view);
+    fault = run_loop(recordings, view);
     run_s = seconds(clock.now() - start);
     // The hand is released. The recordings are closed before the threads that may work for long.
-    context.deadline.start(exit_code(fault));
+    context.start_deadline(fault);
     const StopDeadline::RecordingTime recording(context.deadline);
     recordings.close();
   }
@@ -158,18 +228,6 @@ Fault run_on_link(RunConfig config, const RunContext& context, ReportLink& link,
 
 TimePoint end_time(const Options& options, const Clock& clock) {
   return options.seconds > 0.0 ? clock.now() + from_seconds(options.seconds) : TimePoint::max();
-}
-
-/// Returns the simulated device with the faults of the script.
-std::unique_ptr<SimulatedLink> make_scripted_link(const RunConfig& config, const LoopbackScript& script,
-                                                  Clock& clock) {
-  auto link = make_simulated_link(config.profile, config.settings.simulation, clock);
-  for (const SimulatedFault& fault : script.faults) try {
-      link->device().inject(fault);
-    } catch (const std::invalid_argument& error) {
-      throw std::runtime_error(script.file.string() + ": " + error.what());
-    }
-  return link;
 }
 
 /// Displaces the path of a simulated hand that would start inside an obstacle, and says so.
@@ -190,107 +248,158 @@ void start_clear(const Runtime& runtime, DeviceInHand& device) {
         1e3 * d_B_m->x(), 1e3 * d_B_m->y(), 1e3 * d_B_m->z());
 }
 
+/// Opens a simulated device, in this process or in another one.
+void open_simulated(Hand& hand) {
+  if (hand.device.simulated != nullptr) start_clear(hand.runtime, *hand.device.simulated);
+  hand.runtime.open();
+  log_missing_motors(hand.runtime.config().profile);
+}
+
 /// Runs the loop with a simulated device. If a script unplugs the device, waits until it can be opened again,
 /// as for a real device; it is disarmed then. `run_once` runs the loop until it ends.
-Fault run_with_reconnection(Runtime& runtime, const RunContext& context, Clock& clock, TimePoint end,
-                            ScheduledRequests& requests, const std::function<Fault()>& run_once) {
+Fault run_with_reconnection(Hand& hand, Clock& clock, TimePoint end, ScheduledRequests& requests,
+                            const std::function<Fault()>& run_once) {
   constexpr Duration kOpenPeriod = std::chrono::milliseconds(1);
-  const auto opened = [&] {
-    try {
-      runtime.open();
-      return true;
-    } catch (const std::runtime_error&) {  // the script still keeps the device unplugged
-      return false;
-    }
-  };
   for (;;) {
     const Fault fault = run_once();
     if (fault != Fault::device_lost) return fault;
-    runtime.close();
+    hand.runtime.close();
     requests.cancel_arm();
-    spdlog::info("the simulated device was unplugged; waiting for it");
-    context.service.waiting("the device was unplugged");
-    while (!opened()) {
-      if (context.signals.stop_requested() || clock.now() >= end) return Fault::none;
+    log_unplugged(hand.context);
+    while (!open_again(hand.runtime)) {
+      if (hand.context.stop_requested() || clock.now() >= end) return Fault::none;
       clock.sleep_until(clock.now() + kOpenPeriod);
     }
-    spdlog::info("the device is connected again, and is disarmed");
   }
 }
 
-Fault run_simulated_in_virtual_time(RunConfig config, const RunContext& context,
-                                    const LoopbackScript& script) {
+Fault run_one_in_virtual_time(RunConfig config, const RunContext& context) {
   VirtualClock clock;
-  const auto link = make_scripted_link(config, script, clock);
-  return run_on_link(std::move(config), context, *link, &link->device(), clock,
-                     [&](Runtime& runtime, Recordings& recordings, LiveView& view) {
-                       start_clear(runtime, link->device());
-                       runtime.open();
-                       log_missing_motors(runtime.config().profile);
-                       const TimePoint end = end_time(context.options, clock);
-                       ScheduledRequests requests(context.options.arm, script.commands, clock.now());
-                       return run_with_reconnection(runtime, context, clock, end, requests, [&] {
-                         return run_in_virtual_time(runtime, context, recordings, end, clock, view, requests);
-                       });
-                     });
+  Hand hand(std::move(config), context, clock);
+  return run_hand(hand, clock, [&](Recordings& recordings, LiveView& view) {
+    open_simulated(hand);
+    const TimePoint end = end_time(context.options, clock);
+    ScheduledRequests requests(context.options.arm, hand.device.script.commands, clock.now());
+    return run_with_reconnection(hand, clock, end, requests, [&] {
+      return run_in_virtual_time(hand.runtime, context, recordings, end, clock, view, requests);
+    });
+  });
 }
 
-/// The simulated device is in this process, or in another process at the other end of --link-fd.
-Fault run_simulated_in_wall_time(RunConfig config, const RunContext& context, const LoopbackScript& script) {
-  WallClock clock;
-  std::unique_ptr<ReportLink> link;
-  DeviceInHand* device = nullptr;  // null: in another process
-  if (context.options.link_fd >= 0) {
-    link = std::make_unique<SocketLink>(context.options.link_fd, link_settings(config));
-  } else {
-    auto simulated = make_scripted_link(config, script, clock);
-    device = &simulated->device();
-    link = std::move(simulated);
+/// Both loops run on the calling thread, by one clock.
+Fault run_both_in_virtual_time(std::vector<RunConfig> configs, const RunContext& context) {
+  VirtualClock clock;
+  RunContext context_of_second = context;
+  context_of_second.hand = 1;
+  const auto first = make_hand(std::move(configs[0]), context, clock);
+  const auto second = make_hand(std::move(configs[1]), context_of_second, clock);
+  std::array<Fault, 2> faults{};
+  run_hand(*first, clock, [&](Recordings& recordings, LiveView& view) {
+    open_simulated(*first);
+    ScheduledRequests requests(context.options.arm, first->device.script.commands, clock.now());
+    run_hand(*second, clock, [&](Recordings& recordings_of_second, LiveView& view_of_second) {
+      open_simulated(*second);
+      ScheduledRequests requests_of_second(context.options.arm, {}, clock.now());
+      std::array<VirtualHand, 2> hands = {
+          VirtualHand{first->runtime, recordings, view, requests, first->context},
+          VirtualHand{second->runtime, recordings_of_second, view_of_second, requests_of_second,
+                      second->context}};
+      faults = run_two_in_virtual_time(hands, end_time(context.options, clock), clock);
+      return faults[1];
+    });
+    return faults[0];
+  });
+  return faults[0] != Fault::none ? faults[0] : faults[1];
+}
+
+/// Runs the loop of a hand by the clock of the machine. end: of a run with a real device, which includes the
+/// time of waiting for it.
+Fault run_one_in_wall_time(Hand& hand, WallClock& clock, TimePoint end) {
+  const RunContext& context = hand.context;
+  return run_hand(hand, clock, [&](Recordings&, LiveView& view) {
+    if (hand.device.plugged != nullptr)
+      return run_with_device(hand.runtime, context, *hand.device.plugged, end, clock, view);
+    open_simulated(hand);
+    const TimePoint simulated_end = end_time(context.options, clock);
+    ScheduledRequests requests(context.options.arm, hand.device.script.commands, clock.now());
+    const auto run_once = [&] {
+      return run_in_wall_time(hand.runtime, context, hand.runtime.config().profile.name + ", simulated",
+                              simulated_end, clock, view, requests);
+    };
+    // The process at the other end of a socket cannot come back over the same socket.
+    if (hand.device.simulated == nullptr) return run_once();
+    return run_with_reconnection(hand, clock, simulated_end, requests, run_once);
+  });
+}
+
+/// Each hand has a thread that waits for its device and supervises its loop. If one ends with an exception,
+/// the other one ends too.
+Fault run_both_in_wall_time(Hand& first, Hand& second, TwoHandRun& shared, WallClock& clock, TimePoint end) {
+  std::array<Fault, 2> faults{};
+  std::array<std::exception_ptr, 2> errors;
+  const auto run = [&](Hand& hand) noexcept {
+    const std::size_t i = hand.context.hand;
+    try {
+      faults[i] = run_one_in_wall_time(hand, clock, end);
+    } catch (...) {
+      errors[i] = std::current_exception();
+      shared.failed.store(true);
+    }
+  };
+  std::thread thread_of_second([&] { run(second); });
+  run(first);
+  thread_of_second.join();
+  for (const std::exception_ptr& error : errors)
+    if (error) std::rethrow_exception(error);
+  return faults[0] != Fault::none ? faults[0] : faults[1];
+}
+
+/// Waits for the device that decides the profile, for each hand whose configuration names none. Returns false
+/// if a signal or `end` ended the waiting.
+bool choose_profiles(std::vector<RunConfig>& configs, const RunContext& context, const WallClock& clock,
+                     TimePoint end) {
+  const StopCondition stop = [&] { return context.stop_requested() || clock.now() >= end; };
+  for (std::size_t i = 0; i < configs.size(); ++i) {
+    RunConfig& config = configs[i];
+    if (!config.profile.name.empty()) continue;
+    const LogPrefix prefix(config.hand());
+    const ReportWaiting waiting = [&](const std::string& reason) {
+      for (std::size_t hand = 0; hand < configs.size(); ++hand)
+        context.service.waiting(hand == i ? reason : "the other hand has no device yet", hand);
+    };
+    if (!choose_profile(config, stop, waiting)) return false;
   }
-  log_grants(lock_memory(config.settings.servo.realtime));
-  return run_on_link(
-      std::move(config), context, *link, device, clock, [&](Runtime& runtime, Recordings&, LiveView& view) {
-        if (device != nullptr) start_clear(runtime, *device);
-        runtime.open();
-        log_missing_motors(runtime.config().profile);
-        const TimePoint end = end_time(context.options, clock);
-        ScheduledRequests requests(context.options.arm, script.commands, clock.now());
-        const auto run_once = [&] {
-          return run_in_wall_time(runtime, context, runtime.config().profile.name + ", simulated", end, clock,
-                                  view, requests);
-        };
-        // The process at the other end of a socket cannot come back over the same socket.
-        if (context.options.link_fd >= 0) return run_once();
-        return run_with_reconnection(runtime, context, clock, end, requests, run_once);
-      });
+  return true;
 }
 
-Fault run_simulated(RunConfig config, const RunContext& context) {
-  LoopbackScript script;
-  if (!context.options.script.empty()) script = load_loopback_script(context.options.script);
-  return context.options.virtual_time ? run_simulated_in_virtual_time(std::move(config), context, script)
-                                      : run_simulated_in_wall_time(std::move(config), context, script);
-}
-
-Fault run_real(RunConfig config, const RunContext& context) {
+Fault run_by_machine_clock(std::vector<RunConfig> configs, const RunContext& context) {
   WallClock clock;
   const TimePoint end = end_time(context.options, clock);
-  const StopCondition stop = [&] { return context.signals.stop_requested() || clock.now() >= end; };
-  const ReportWaiting waiting = [&](const std::string& reason) { context.service.waiting(reason); };
-  if (config.profile.name.empty() && !choose_profile(config, stop, waiting)) return Fault::none;
-  const auto link = make_plugged_link(config);
-  log_grants(lock_memory(config.settings.servo.realtime));
-  return run_on_link(std::move(config), context, *link, nullptr, clock,
-                     [&](Runtime& runtime, Recordings&, LiveView& view) {
-                       return run_with_device(runtime, context, *link, end, clock, view);
-                     });
+  if (!choose_profiles(configs, context, clock, end)) return Fault::none;
+  const ServoSettings servo = configs[0].settings.servo;
+  log_grants(lock_memory(servo.realtime));
+  if (configs.size() == 1) {
+    Hand hand(std::move(configs[0]), context, clock);
+    return run_one_in_wall_time(hand, clock, end);
+  }
+  TwoHandThread thread(servo, clock);
+  TwoHandRun shared{.thread = thread};
+  RunContext first_context = context;
+  first_context.two_hands = &shared;
+  RunContext second_context = first_context;
+  second_context.hand = 1;
+  const auto first = make_hand(std::move(configs[0]), first_context, clock);
+  const auto second = make_hand(std::move(configs[1]), second_context, clock);
+  return run_both_in_wall_time(*first, *second, shared, clock, end);
 }
 
 }  // namespace
 
-Fault run_daemon(RunConfig config, const RunContext& context) {
-  const bool simulated = config.simulated || context.options.link_fd >= 0;
-  return simulated ? run_simulated(std::move(config), context) : run_real(std::move(config), context);
+Fault run_daemon(std::vector<RunConfig> hands, const RunContext& context) {
+  if (hands.size() > 1) context.service.add_second_hand(hands[1].hand());
+  if (!context.options.virtual_time) return run_by_machine_clock(std::move(hands), context);
+  if (hands.size() == 1) return run_one_in_virtual_time(std::move(hands[0]), context);
+  return run_both_in_virtual_time(std::move(hands), context);
 }
 
 }  // namespace wrenchd

@@ -10,8 +10,10 @@ namespace wrenchd {
 
 Fault run_with_device(Runtime& runtime, const RunContext& context, const ReconnectingLink& link,
                       TimePoint end, WallClock& clock, LiveView& view) {
-  const StopCondition stop = [&] { return context.signals.stop_requested() || clock.now() >= end; };
-  const ReportWaiting waiting = [&](const std::string& reason) { context.service.waiting(reason); };
+  const StopCondition stop = [&] { return context.stop_requested() || clock.now() >= end; };
+  const ReportWaiting waiting = [&](const std::string& reason) {
+    context.service.waiting(reason, context.hand);
+  };
   const DeviceProfile& profile = runtime.config().profile;
   DeviceWait wait;
   for (bool at_start = true;; at_start = false) {

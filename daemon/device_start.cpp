@@ -43,6 +43,21 @@ bool open_device(Runtime& runtime, DeviceWait& wait, bool at_start, const StopCo
       stop);
 }
 
+bool open_again(Runtime& runtime) {
+  try {
+    runtime.open();
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+  spdlog::info("the device is connected again, and is disarmed");
+  return true;
+}
+
+void log_unplugged(const RunContext& context) {
+  spdlog::info("the simulated device was unplugged; waiting for it");
+  context.service.waiting("the device was unplugged", context.hand);
+}
+
 void log_device(const DeviceProfile& profile, const UsbDevice& device) {
   const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
   spdlog::info("device {} ({}): senses {}, drives {}", describe(device), text(profile.transport),

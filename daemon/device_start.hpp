@@ -6,6 +6,7 @@
 
 #include "config/calibration_store.hpp"
 #include "daemon/device_wait.hpp"
+#include "daemon/run_context.hpp"
 #include "daemon/runtime.hpp"
 
 namespace wrenchd {
@@ -27,6 +28,11 @@ bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWa
 /// use it. Otherwise logs such an error and tries again.
 bool open_device(Runtime& runtime, DeviceWait& wait, bool at_start, const StopCondition& stop,
                  const ReportWaiting& waiting);
+
+/// Opens a simulated device again. Returns false as long as its script keeps it unplugged. Does not wait.
+bool open_again(Runtime& runtime);
+/// Logs, and tells the service manager, that the simulated device of this hand was unplugged. Does not wait.
+void log_unplugged(const RunContext& context);
 
 /// Logs identity, transport, sensed and driven degrees of freedom of the device. Does not wait.
 void log_device(const DeviceProfile& profile, const UsbDevice& device);

@@ -18,10 +18,12 @@ class LiveView {
  public:
   using Print = std::function<void(std::string text)>;
 
-  /// print: null prints nothing. terminal: the text goes to a terminal.
-  LiveView(Print print, bool terminal, const DeviceProfile& profile);
+  /// print: null prints nothing. terminal: the text goes to a terminal. hand: name of the second hand, before
+  /// its lines; empty: the first hand.
+  LiveView(Print print, bool terminal, const DeviceProfile& profile, const std::string& hand = {});
 
-  /// Prints the newest tick record. Does nothing before the first tick.
+  /// Prints the newest tick record. Does nothing before the first tick, and for the second hand on a
+  /// terminal: the one line there is that of the first hand.
   void sample(ServoLoop& loop);
   /// Prints the summary of the run. seconds: duration of the run.
   void close(const ServoLoop& loop, double seconds);
@@ -30,6 +32,7 @@ class LiveView {
   Print print_;
   bool terminal_;
   ShownWrench shown_;
+  std::string prefix_;  ///< "left: "
   std::uint64_t samples_ = 0;
 };
 

@@ -11,19 +11,24 @@
 #include <unistd.h>
 
 #include "daemon/journal.hpp"
+#include "daemon/log_prefix.hpp"
 #include "daemon/standard_streams.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Queues each log entry, with the journal fields of the thread that logs it. spdlog's own asynchronous
-/// logger is not used: at the end it waits for its thread without a limit.
+/// Queues each log entry, with the prefix and the journal fields of the thread that logs it. spdlog's own
+/// asynchronous logger is not used: at the end it waits for its thread without a limit.
 class QueuedSink final : public spdlog::sinks::sink {
  public:
   QueuedSink(OutputQueue& queue, std::shared_ptr<spdlog::sinks::sink> target)
       : queue_(queue), target_(std::move(target)) {}
 
-  void log(const spdlog::details::log_msg& message) override {
+  void log(const spdlog::details::log_msg& original) override {
+    const std::string text =
+        LogPrefix::current() + std::string(original.payload.data(), original.payload.size());
+    spdlog::details::log_msg message = original;
+    message.payload = text;  // the buffer below copies it
     queue_.post(message.payload.size(), [target = target_, entry = spdlog::details::log_msg_buffer(message),
                                          fields = JournalFields::current()] {
       const JournalFields here(fields);

@@ -24,7 +24,7 @@ int run(const wrenchd::Options& options, wrenchd::LogOutput& log) {
   try {
     wrenchd::StopDeadline deadline(signals, [&log] { log.close(); });
     return wrenchd::exit_code(
-        wrenchd::run_daemon(wrenchd::load_run_config(options), {options, signals, service, deadline}));
+        wrenchd::run_daemon(wrenchd::load_run_configs(options), {options, signals, service, deadline}));
   } catch (const std::exception& error) {
     log.print_error(std::string("wrenchd: ") + error.what() + "\n");
     service.stopping(std::string("rejected: ") + error.what());

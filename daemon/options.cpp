@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/guide_line.hpp"
+#include "daemon/hand_file.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/version.hpp"
@@ -82,14 +83,15 @@ std::string simulate_hint(const RunConfig& config) {
 
 void check_device_options(const Options& options, const RunConfig& config) {
   const bool unnamed = config.profile.name.empty();
-  const bool in_process = config.simulated && options.link_fd < 0;
-  if (options.link_fd >= 0 && unnamed)
-    throw std::runtime_error(
-        "--link-fd: wrenchd cannot identify the device at the other end; name its profile with --profile");
   if (!options.simulate.empty() && unnamed)
     throw std::runtime_error("--simulate auto: name the profile to simulate, as in --simulate loopback");
   if (options.virtual_time && !config.simulated)
     throw std::runtime_error("--virtual-time: a real device runs in real time; " + simulate_hint(config));
+  if (config.is_second) return;  // the other options are those of the first hand
+  const bool in_process = config.simulated && options.link_fd < 0;
+  if (options.link_fd >= 0 && unnamed)
+    throw std::runtime_error(
+        "--link-fd: wrenchd cannot identify the device at the other end; name its profile with --profile");
   if (!options.script.empty() && !in_process)
     throw std::runtime_error("--loopback-script: a real device cannot run a script; " +
                              simulate_hint(config));
@@ -132,16 +134,18 @@ void add_options(CLI::App& app, Options& options) {
   add_run_options(app, options);
 }
 
-RunConfig load_run_config(const Options& options) {
+std::vector<RunConfig> load_run_configs(const Options& options) {
   RunConfigFiles files = options.files;
   if (!options.simulate.empty()) files.profile = options.simulate;
   files.simulate = !options.simulate.empty();
-  RunConfig config = load_run_config(files, SearchPath());
-  check_device_options(options, config);
-  apply_realtime(options, config.settings.servo);
-  if (!options.record.empty()) config.settings.recording.file = options.record;
-  apply_playback(options, config.settings.simulation);
-  return config;
+  std::vector<RunConfig> hands = load_run_configs(files, SearchPath());
+  for (RunConfig& hand : hands) {
+    check_device_options(options, hand);
+    apply_realtime(options, hand.settings.servo);
+    if (!options.record.empty()) hand.settings.recording.file = file_of_hand(options.record, hand.hand());
+  }
+  apply_playback(options, hands.front().settings.simulation);
+  return hands;
 }
 
 }  // namespace wrenchd

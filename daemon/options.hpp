@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "daemon/run_config.hpp"
 #include "daemon/runtime.hpp"
@@ -33,9 +34,10 @@ struct Options {
 /// Adds the options and the help text to `app`. `options` must outlive the parsing. Not RT-safe: allocates.
 void add_options(CLI::App& app, Options& options);
 
-/// Reads the configuration files and applies the command line on top of them. Throws ConfigError for a file
+/// Reads the configuration files and applies the command line on top of them, for each hand. The path and the
+/// faults of a simulated hand on the command line are those of the first hand. Throws ConfigError for a file
 /// that it rejects, and std::runtime_error for options that contradict each other or the device. Not RT-safe:
 /// reads files.
-RunConfig load_run_config(const Options& options);
+std::vector<RunConfig> load_run_configs(const Options& options);
 
 }  // namespace wrenchd

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/process_signals.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -31,21 +32,35 @@ constexpr long kWriteTime_us = 50'000;
 // A signal handler has no argument, so its state is static. It uses lock-free atomics only.
 std::atomic<bool> stop_flag{false};
 std::atomic<bool> reload_flag{false};
-std::atomic<ServoLoop*> target{nullptr};
-std::atomic<int> handlers_using_target{0};
+/// The loops of the signal targets; null: none.
+std::array<std::atomic<ServoLoop*>, SignalTarget::kMaxTargets> targets{};
+std::atomic<int> handlers_using_targets{0};
 std::atomic<pid_t> servo_thread{0};  ///< 0: no thread ticks the loop
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free &&
                   std::atomic<CommandSet>::is_always_lock_free &&
                   std::atomic<ServoLoop*>::is_always_lock_free && std::atomic<State>::is_always_lock_free,
               "a signal handler may only use lock-free atomics");
 
-/// Calls `use` with the servo loop, if there is one. The count keeps ~SignalTarget() from returning
-/// meanwhile.
+/// While this object lives, ~SignalTarget() does not return.
+class TargetUse {
+ public:
+  TargetUse() noexcept { handlers_using_targets.fetch_add(1); }
+  ~TargetUse() { handlers_using_targets.fetch_sub(1); }
+  TargetUse(const TargetUse&) = delete;
+  TargetUse& operator=(const TargetUse&) = delete;
+};
+
+/// Calls `use` with each servo loop.
 template <class Use>
-void with_target(const Use& use) {
-  handlers_using_target.fetch_add(1);
-  if (ServoLoop* const loop = target.load()) use(*loop);
-  handlers_using_target.fetch_sub(1);
+void for_each_target(const Use& use) {
+  const TargetUse in_use;
+  for (const std::atomic<ServoLoop*>& target : targets)
+    if (ServoLoop* const loop = target.load()) use(*loop);
+}
+
+bool has_target() noexcept {
+  return std::any_of(targets.begin(), targets.end(),
+                     [](const std::atomic<ServoLoop*>& target) { return target.load() != nullptr; });
 }
 
 void sleep_us(long us) noexcept {
@@ -93,21 +108,29 @@ void release_and_crash(int signal) {
 }  // namespace
 
 void release_hand_before_exit() noexcept {
-  with_target([](ServoLoop& loop) {
-    const auto released = [&loop] { return loop.telemetry().state() == State::shutdown; };
-    const pid_t thread = servo_thread.load();
-    const bool no_tick_runs = thread == 0 || thread == ::gettid();
-    if (no_tick_runs && !released()) loop.release(std::chrono::steady_clock::now());
-    if (no_tick_runs) return sleep_us(kWriteTime_us);
-    // The stop removes the force in the next tick, whatever the state; then the loop can end at once. It is
-    // requested for good, because a loop that ticks on would take the device for a new one and test it.
-    loop.requests().request_for_good(kStop | kQuit);
-    for (long us = 0, since_release_us = 0; us < kReleaseWithin_us && since_release_us < kWriteTime_us;
-         us += kPollPeriod_us) {
-      if (since_release_us > 0 || released()) since_release_us += kPollPeriod_us;
-      sleep_us(kPollPeriod_us);
-    }
-  });
+  const TargetUse in_use;
+  if (!has_target()) return;
+  const auto is_released = [](const ServoLoop& loop) { return loop.telemetry().state() == State::shutdown; };
+  const auto all_released = [&is_released] {
+    bool all = true;
+    for_each_target([&](const ServoLoop& loop) { all = all && is_released(loop); });
+    return all;
+  };
+  const pid_t thread = servo_thread.load();
+  if (thread == 0 || thread == ::gettid()) {  // no tick runs
+    for_each_target([&is_released](ServoLoop& loop) {
+      if (!is_released(loop)) loop.release(std::chrono::steady_clock::now());
+    });
+    return sleep_us(kWriteTime_us);
+  }
+  // The stop removes the force in the next tick, whatever the state; then the loop can end at once. It is
+  // requested for good, because a loop that ticks on would take the device for a new one and test it.
+  for_each_target([](ServoLoop& loop) { loop.requests().request_for_good(kStop | kQuit); });
+  for (long us = 0, since_release_us = 0; us < kReleaseWithin_us && since_release_us < kWriteTime_us;
+       us += kPollPeriod_us) {
+    if (since_release_us > 0 || all_released()) since_release_us += kPollPeriod_us;
+    sleep_us(kPollPeriod_us);
+  }
 }
 
 ProcessSignals::ProcessSignals() {
@@ -116,9 +139,9 @@ ProcessSignals::ProcessSignals() {
     set_handler(signal, stop);
   for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) set_handler(signal, stop);
   set_handler(SIGHUP, [](int) { reload_flag.store(true); });
-  set_handler(SIGUSR1, [](int) { with_target([](ServoLoop& loop) { loop.requests().request(kStop); }); });
+  set_handler(SIGUSR1, [](int) { for_each_target([](ServoLoop& loop) { loop.requests().request(kStop); }); });
   set_handler(SIGUSR2,
-              [](int) { with_target([](ServoLoop& loop) { loop.requests().request(kAcknowledge); }); });
+              [](int) { for_each_target([](ServoLoop& loop) { loop.requests().request(kAcknowledge); }); });
   for (const int signal : {SIGPIPE, SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU}) set_handler(signal, SIG_IGN);
   for (std::size_t i = 0; i < kCrashSignals.size(); ++i)
     previous_actions[i] = set_handler(kCrashSignals[i], release_and_crash);
@@ -133,13 +156,17 @@ bool ProcessSignals::take_reload_request() const noexcept {
   return reload_flag.exchange(false);
 }
 
-SignalTarget::SignalTarget(ServoLoop& loop) noexcept {
-  target.store(&loop);
+SignalTarget::SignalTarget(ServoLoop& loop) noexcept : loop_(loop) {
+  for (std::atomic<ServoLoop*>& target : targets) {
+    ServoLoop* none = nullptr;
+    if (target.compare_exchange_strong(none, &loop)) return;
+  }
 }
 
 SignalTarget::~SignalTarget() {
-  target.store(nullptr);
-  while (handlers_using_target.load() != 0) std::this_thread::yield();
+  for (std::atomic<ServoLoop*>& target : targets)
+    if (target.load() == &loop_) target.store(nullptr);
+  while (handlers_using_targets.load() != 0) std::this_thread::yield();
 }
 
 ServoThreadMark::ServoThreadMark() noexcept {

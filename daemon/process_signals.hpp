@@ -34,18 +34,24 @@ class ProcessSignals {
   bool take_reload_request() const noexcept;
 };
 
-/// Connects the signal handlers to a servo loop while this object lives. At most one object at a time.
+/// Connects the signal handlers to a servo loop while this object lives: one object for each hand, at most
+/// kMaxTargets at a time.
 ///
 /// The destructor waits until no handler uses the loop any more, so a handler never uses a destroyed loop.
 class SignalTarget {
  public:
+  static constexpr std::size_t kMaxTargets = 2;
+
   explicit SignalTarget(ServoLoop& loop) noexcept;
   ~SignalTarget();
   SignalTarget(const SignalTarget&) = delete;
   SignalTarget& operator=(const SignalTarget&) = delete;
+
+ private:
+  ServoLoop& loop_;
 };
 
-/// While this object lives, the calling thread ticks the loop of the signal target. A crash on this thread
+/// While this object lives, the calling thread ticks the loops of the signal targets. A crash on this thread
 /// releases the hand directly; a crash on any other thread asks this thread to release it, because a release
 /// must not run beside a tick.
 class ServoThreadMark {

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/runtime.hpp"
 
+#include <optional>
+#include <utility>
+
 #include "config/config_error.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "config/near_file.hpp"
+#include "config/scene_text.hpp"
+#include "config/second_hand.hpp"
 #include "core/watch_limits.hpp"
+#include "daemon/hand_file.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/recording/recorded_inputs.hpp"
 
@@ -40,11 +46,10 @@ Duration stall_timeout(const ServoSettings& servo) noexcept {
   return periods * from_seconds(1.0 / servo.rate_Hz) + kLateTick;
 }
 
-}  // namespace
-
-RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search) {
+/// Reads the scene and the profile of a hand.
+RunConfig complete(Settings settings, const RunConfigFiles& files, const SearchPath& search) {
   RunConfig config;
-  config.settings = load_settings(find_file(files.config, search), search);
+  config.settings = std::move(settings);
   if (!files.scene.empty()) config.settings.scene = find_file(files.scene, search);
   if (!files.profile.empty()) {
     config.settings.device.profile = files.profile;
@@ -61,6 +66,51 @@ RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search)
   if (SimulationSettings& simulation = config.settings.simulation; !simulation.playback.empty())
     simulation.playback_path = read_playback(simulation.playback);
   return config;
+}
+
+/// Returns true if nothing in the configuration keeps two hands from opening the same real device.
+bool may_open_same_device(const RunConfig& a, const RunConfig& b) {
+  const DeviceSettings& one = a.settings.device;
+  const DeviceSettings& other = b.settings.device;
+  if (a.simulated || b.simulated) return false;
+  if (one.profile != other.profile && one.profile != kAnyProfile && other.profile != kAnyProfile)
+    return false;
+  const auto names_device = [](const DeviceSettings& device) {
+    return !device.serial.empty() || !device.usb_port.empty();
+  };
+  return !names_device(one) || !names_device(other) ||
+         (one.serial == other.serial && one.usb_port == other.usb_port);
+}
+
+}  // namespace
+
+std::vector<RunConfig> load_run_configs(const RunConfigFiles& files, const SearchPath& search) {
+  const std::filesystem::path file = find_file(files.config, search);
+  std::optional<SecondHand> second;
+  std::vector<RunConfig> hands;
+  hands.push_back(complete(load_settings(file, search, &second), files, search));
+  if (!second) return hands;
+  RunConfigFiles files_of_second = files;
+  if (second->names_profile) files_of_second.profile.clear();
+  hands.push_back(complete(std::move(second->settings), files_of_second, search));
+  RunConfig& first = hands.front();
+  RunConfig& other = hands.back();
+  if (second->tool) {
+    other.scene.tool = *second->tool;
+    other.scene.text = scene_text(other.scene, 0.0);
+  }
+  if (may_open_same_device(first, other))
+    throw ConfigError(file, second->location,
+                      "both hands may use the same device: state serial or usb_port in [device] and in "
+                      "[hand.device], or another profile for one of them");
+  other.is_second = true;
+  for (RunConfig& hand : hands) hand.second_hand = second->name;
+  other.settings.recording.file = file_of_hand(other.settings.recording.file, second->name);
+  return hands;
+}
+
+RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search) {
+  return std::move(load_run_configs(files, search).front());
 }
 
 LinkSettings link_settings(const RunConfig& config) {

@@ -33,7 +33,11 @@ struct RunConfigFiles {
   bool simulate = false;        ///< simulate the device, whatever transport its profile has
 };
 
-/// Reads the configuration, its scene and its profile. Throws ConfigError. Not RT-safe: reads files.
+/// Reads the configuration, its scene and its profile, for the first hand and, if the configuration has a
+/// [[hand]], for the second one. `files` apply to both hands; a profile does not replace one that [[hand]]
+/// names. Throws ConfigError. Not RT-safe: reads files.
+std::vector<RunConfig> load_run_configs(const RunConfigFiles& files, const SearchPath& search);
+/// Returns the first of load_run_configs().
 RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search);
 
 /// Returns the settings of a link with a writer thread: write deadline, and the time after which the thread

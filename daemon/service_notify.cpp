@@ -42,22 +42,25 @@ std::string status_text(const LoopStatus& loop, const std::string& device) {
   return to_one_line(text + "; device " + device);
 }
 
-void ServiceReport::waiting(std::string reason) {
-  phase_ = Phase::waiting;
-  detail_ = std::move(reason);
-  last_ticks_.reset();
+void ServiceReport::add_second_hand(std::string name) {
+  hands_.push_back({.name = std::move(name), .detail = {}, .last_ticks = {}});
 }
 
-void ServiceReport::running(std::string device) {
-  phase_ = Phase::running;
-  detail_ = std::move(device);
-  last_ticks_.reset();
+void ServiceReport::waiting(std::string reason, std::size_t hand) {
+  hands_[hand].phase = Phase::waiting;
+  hands_[hand].detail = std::move(reason);
+  hands_[hand].last_ticks.reset();
+}
+
+void ServiceReport::running(std::string device, std::size_t hand) {
+  hands_[hand].phase = Phase::running;
+  hands_[hand].detail = std::move(device);
+  hands_[hand].last_ticks.reset();
 }
 
 void ServiceReport::stopping(std::string reason) {
-  if (phase_ != Phase::stopping) pending_ += "STOPPING=1\n";
-  phase_ = Phase::stopping;
-  detail_ = std::move(reason);
+  if (stop_reason_.empty()) pending_ += "STOPPING=1\n";
+  stop_reason_ = std::move(reason);
 }
 
 void ServiceReport::reloading(std::uint64_t monotonic_us) {
@@ -68,34 +71,42 @@ void ServiceReport::reloaded() {
   pending_ += "READY=1\n";
 }
 
-std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop) {
-  std::string status;
-  bool ready = ready_sent_, alive = true;
-  switch (phase_) {
+ServiceReport::Part ServiceReport::part_of(Hand& hand, const std::optional<LoopStatus>& loop) const {
+  switch (hand.phase) {
     case Phase::starting:
-      status = "starting";
-      alive = false;  // the watchdog starts with READY=1
-      break;
+      return {"starting", ready_sent_, false};  // the watchdog starts with READY=1
     case Phase::waiting:
-      status = to_one_line("waiting: " + detail_);
-      ready = true;
-      break;
+      return {to_one_line("waiting: " + hand.detail), true, true};
     case Phase::running:
-      if (!loop) break;  // the loop has just ended
-      status = status_text(*loop, detail_);
-      ready = ready || (loop->state != State::disconnected && loop->state != State::self_test);
-      alive = last_ticks_ != loop->ticks;
-      last_ticks_ = loop->ticks;
-      break;
-    case Phase::stopping:
-      status = to_one_line(detail_);
       break;
   }
+  if (!loop) return {"", ready_sent_, true};  // the loop has just ended
+  const bool tested = loop->state != State::disconnected && loop->state != State::self_test;
+  const bool ticked = hand.last_ticks != loop->ticks;
+  hand.last_ticks = loop->ticks;
+  return {status_text(*loop, hand.detail), ready_sent_ || tested, ticked};
+}
+
+/// The status names both hands: "disarmed; device a | left: waiting: ...".
+ServiceReport::Part ServiceReport::part_of_all(const std::optional<LoopStatus>& loop,
+                                               const std::optional<LoopStatus>& second) {
+  Part all = part_of(hands_[0], loop);
+  if (hands_.size() < 2) return all;
+  const Part other = part_of(hands_[1], second);
+  const bool news = !all.status.empty() && !other.status.empty();
+  return {news ? all.status + " | " + hands_[1].name + ": " + other.status : "", all.ready && other.ready,
+          all.alive && other.alive};
+}
+
+std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop,
+                                        const std::optional<LoopStatus>& second) {
+  const Part now =
+      stop_reason_.empty() ? part_of_all(loop, second) : Part{to_one_line(stop_reason_), ready_sent_, true};
   std::string text = std::exchange(pending_, {});
-  if (ready && !std::exchange(ready_sent_, ready)) text += "READY=1\n";
-  if (alive && ready_sent_) text += "WATCHDOG=1\n";
-  if (!status.empty() && status != last_status_) text += "STATUS=" + status + "\n";
-  if (!status.empty()) last_status_ = status;
+  if (now.ready && !std::exchange(ready_sent_, now.ready)) text += "READY=1\n";
+  if (now.alive && ready_sent_) text += "WATCHDOG=1\n";
+  if (!now.status.empty() && now.status != last_status_) text += "STATUS=" + now.status + "\n";
+  if (!now.status.empty()) last_status_ = now.status;
   return text;
 }
 
@@ -114,28 +125,32 @@ ServiceNotify::~ServiceNotify() {
   thread_ = {};  // join first: the thread uses the other members
 }
 
-void ServiceNotify::waiting(const std::string& reason) {
+void ServiceNotify::add_second_hand(const std::string& name) {
+  update([&] { report_.add_second_hand(name); });
+}
+
+void ServiceNotify::waiting(const std::string& reason, std::size_t hand) {
   update([&] {
-    read_loop_status_ = nullptr;
-    report_.waiting(reason);
+    read_loop_status_[hand] = nullptr;
+    report_.waiting(reason, hand);
   });
 }
 
-void ServiceNotify::running(ReadLoopStatus loop, const std::string& device) {
+void ServiceNotify::running(ReadLoopStatus loop, const std::string& device, std::size_t hand) {
   update([&] {
-    read_loop_status_ = std::move(loop);
-    report_.running(device);
+    read_loop_status_[hand] = std::move(loop);
+    report_.running(device, hand);
   });
 }
 
-void ServiceNotify::loop_ended() noexcept {
+void ServiceNotify::loop_ended(std::size_t hand) noexcept {
   const std::lock_guard lock(mutex_);
-  read_loop_status_ = nullptr;
+  read_loop_status_[hand] = nullptr;
 }
 
 void ServiceNotify::stopping(const std::string& reason) {
   update([&] {
-    read_loop_status_ = nullptr;
+    read_loop_status_ = {};
     report_.stopping(reason);
   });
 }
@@ -161,8 +176,8 @@ void ServiceNotify::update(const std::function<void()>& change) {
 
 /// Precondition: mutex_ is locked.
 void ServiceNotify::send_report() {
-  const std::string text =
-      report_.next_message(read_loop_status_ ? std::optional(read_loop_status_()) : std::nullopt);
+  const auto status = [](const ReadLoopStatus& read) { return read ? std::optional(read()) : std::nullopt; };
+  const std::string text = report_.next_message(status(read_loop_status_[0]), status(read_loop_status_[1]));
   if (!text.empty()) sd_notify(0, text.c_str());
 }
 

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "core/fault.hpp"
 #include "core/state.hpp"
@@ -31,13 +34,16 @@ std::string status_text(const LoopStatus& loop, const std::string& device);
 ///
 /// READY=1 is sent once: when the first self-test of the loop ends, or when the daemon waits for a device or
 /// a person. WATCHDOG=1 is in every message while no loop runs. While a loop runs, WATCHDOG=1 is in a message
-/// only if the loop has ticked since the previous message.
+/// only if the loop has ticked since the previous message. With two hands both must be ready and both loops
+/// must have ticked.
 class ServiceReport {
  public:
-  /// No loop runs from now on; `reason` is for people.
-  void waiting(std::string reason);
-  /// A loop runs on this device from now on.
-  void running(std::string device);
+  /// The process has a second hand of this name.
+  void add_second_hand(std::string name);
+  /// No loop of this hand runs from now on; `reason` is for people.
+  void waiting(std::string reason, std::size_t hand = 0);
+  /// A loop of this hand runs on this device from now on.
+  void running(std::string device, std::size_t hand = 0);
   /// The daemon ends; `reason` is for people.
   void stopping(std::string reason);
   /// The daemon reads its configuration again. monotonic_us: current time.
@@ -45,17 +51,33 @@ class ServiceReport {
   /// The reload has ended, with or without an error.
   void reloaded();
 
-  /// Returns the next message; empty: nothing to send. loop: state of the running loop, if there is one.
-  std::string next_message(const std::optional<LoopStatus>& loop);
+  /// Returns the next message; empty: nothing to send. loop, second: states of the running loops, if there
+  /// are any.
+  std::string next_message(const std::optional<LoopStatus>& loop,
+                           const std::optional<LoopStatus>& second = {});
 
  private:
-  enum class Phase : std::uint8_t { starting, waiting, running, stopping };
-  Phase phase_ = Phase::starting;
-  std::string detail_;                       ///< reason of waiting or stopping; device while running
-  std::string last_status_;                  ///< last STATUS= that was sent
-  std::string pending_;                      ///< assignments for the next message
-  bool ready_sent_ = false;                  ///< READY=1 was sent
-  std::optional<std::uint64_t> last_ticks_;  ///< tick count at the previous message
+  enum class Phase : std::uint8_t { starting, waiting, running };
+  struct Hand {
+    std::string name;  ///< empty: the first hand
+    Phase phase = Phase::starting;
+    std::string detail;                       ///< reason of waiting; device while running
+    std::optional<std::uint64_t> last_ticks;  ///< tick count at the previous message
+  };
+  /// What one hand contributes to a message.
+  struct Part {
+    std::string status;  ///< empty: no news
+    bool ready;
+    bool alive;
+  };
+  Part part_of(Hand& hand, const std::optional<LoopStatus>& loop) const;
+  Part part_of_all(const std::optional<LoopStatus>& loop, const std::optional<LoopStatus>& second);
+
+  std::vector<Hand> hands_{1};
+  std::string stop_reason_;  ///< empty: the daemon does not end
+  std::string last_status_;  ///< last STATUS= that was sent
+  std::string pending_;      ///< assignments for the next message
+  bool ready_sent_ = false;  ///< READY=1 was sent
 };
 
 /// Sends the state of the daemon to the service manager (systemd, by the socket in $NOTIFY_SOCKET) from a
@@ -71,10 +93,11 @@ class ServiceNotify {
   ServiceNotify(const ServiceNotify&) = delete;
   ServiceNotify& operator=(const ServiceNotify&) = delete;
 
-  void waiting(const std::string& reason);
-  /// The thread calls `loop` until waiting(), loop_ended() or stopping() is called.
-  void running(ReadLoopStatus loop, const std::string& device);
-  void loop_ended() noexcept;
+  void add_second_hand(const std::string& name);
+  void waiting(const std::string& reason, std::size_t hand = 0);
+  /// The thread calls `loop` until waiting() or loop_ended() is called for this hand, or stopping().
+  void running(ReadLoopStatus loop, const std::string& device, std::size_t hand = 0);
+  void loop_ended(std::size_t hand = 0) noexcept;
   void stopping(const std::string& reason);
   void reloading();
   void reloaded();
@@ -87,8 +110,8 @@ class ServiceNotify {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   ServiceReport report_;
-  ReadLoopStatus read_loop_status_;
-  std::jthread thread_;  ///< last member: it uses the members above
+  std::array<ReadLoopStatus, 2> read_loop_status_;  ///< of each hand
+  std::jthread thread_;                             ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

@@ -35,7 +35,7 @@ void StopDeadline::run(const std::stop_token& stop) {
     const auto now = std::chrono::steady_clock::now();
     const auto passed = now - std::exchange(last, now);
     if (!started_.load() && !signals_.stop_requested()) continue;
-    (recording_.load() ? used_recording : used) += passed;
+    (recordings_.load() > 0 ? used_recording : used) += passed;
     if (used < kMaxStop && used_recording < kMaxRecording) continue;
     release_hand_before_exit();
     spdlog::warn("{}; wrenchd ends without waiting for it",

@@ -35,9 +35,9 @@ class StopDeadline {
   class RecordingTime {
    public:
     explicit RecordingTime(StopDeadline& deadline) noexcept : deadline_(deadline) {
-      deadline_.recording_.store(true);
+      deadline_.recordings_.fetch_add(1);
     }
-    ~RecordingTime() { deadline_.recording_.store(false); }
+    ~RecordingTime() { deadline_.recordings_.fetch_sub(1); }
     RecordingTime(const RecordingTime&) = delete;
     RecordingTime& operator=(const RecordingTime&) = delete;
 
@@ -56,8 +56,8 @@ class StopDeadline {
   std::function<void()> before_exit_;
   std::atomic<bool> started_{false};
   std::atomic<int> exit_code_{0};
-  std::atomic<bool> recording_{false};
-  std::jthread thread_;  ///< last member: it uses the members above
+  std::atomic<int> recordings_{0};  ///< number of RecordingTime objects
+  std::jthread thread_;             ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+
 #include "daemon/live_view.hpp"
 #include "daemon/recording/recordings.hpp"
 #include "daemon/run_context.hpp"
@@ -14,5 +16,20 @@ namespace wrenchd {
 /// latched the loop or ended the run, else Fault::none. Not RT-safe: returns when the run is over.
 Fault run_in_virtual_time(Runtime& runtime, const RunContext& context, Recordings& recordings, TimePoint end,
                           VirtualClock& clock, LiveView& view, ScheduledRequests& requests);
+
+/// One of two hands in virtual time.
+struct VirtualHand {
+  Runtime& runtime;
+  Recordings& recordings;
+  LiveView& view;
+  ScheduledRequests& requests;
+  const RunContext& context;
+  bool unplugged = false;
+};
+
+/// As run_in_virtual_time() for two hands: the second loop ticks half a period after the first one. A device
+/// that a script unplugs is opened again while the other hand goes on. Returns the fault of each hand.
+std::array<Fault, 2> run_two_in_virtual_time(std::array<VirtualHand, 2>& hands, TimePoint end,
+                                             VirtualClock& clock);
 
 }  // namespace wrenchd

@@ -1,68 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/wall_time_run.hpp"
 
-#include <atomic>
-#include <exception>
-#include <future>
+#include <memory>
 #include <optional>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include "daemon/contact_rate.hpp"
-#include "daemon/realtime.hpp"
 #include "daemon/servo/realtime_watch.hpp"
+#include "daemon/servo_thread.hpp"
 #include "daemon/thread_guard.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// The servo thread. Its destructor ends the loop and joins the thread.
-class ServoThread {
+/// Starts to tick the loop: on a thread of its own, or on the thread of both hands.
+std::unique_ptr<RunningLoop> start_loop(Runtime& runtime, const RunContext& context, Clock& clock) {
+  if (context.two_hands != nullptr) return context.two_hands->thread.run(context.hand, runtime.loop());
+  return start_servo_thread(runtime.config().settings.servo, runtime.loop(), clock);
+}
+
+/// The service manager reads the loop until this object is destroyed.
+class ServiceStatus {
  public:
-  ServoThread(Runtime& runtime, WallClock& clock, ServiceNotify& service)
-      : service_(service), thread_([this, &runtime, &clock] { run(runtime, clock); }) {}
-  ~ServoThread() { join(); }
-  ServoThread(const ServoThread&) = delete;
-  ServoThread& operator=(const ServoThread&) = delete;
-
-  /// Waits until the thread has asked the kernel for real time. Rethrows its RealtimeError.
-  std::vector<RealtimeGrant> grants() { return prepared_.get_future().get(); }
-  pid_t id() const { return id_.load(); }
-  bool ended() const { return ended_.load(); }
-
-  /// Ends the loop. Returns the fault that ended it.
-  Fault join() noexcept {
-    if (!thread_.joinable()) return fault_;
-    stop_.store(true);
-    thread_.join();
-    service_.loop_ended();
-    return fault_;
+  ServiceStatus(const ServoLoop& loop, const RunContext& context, const std::string& device)
+      : context_(context) {
+    const auto status = [&loop] {
+      return LoopStatus{loop.telemetry().state(), loop.telemetry().cause(),
+                        loop.telemetry().timing().tick.count()};
+    };
+    context.service.running(status, device, context.hand);
   }
+  ~ServiceStatus() { context_.service.loop_ended(context_.hand); }
+  ServiceStatus(const ServiceStatus&) = delete;
+  ServiceStatus& operator=(const ServiceStatus&) = delete;
 
  private:
-  void run(Runtime& runtime, WallClock& clock) {
-    const ServoThreadMark mark;
-    try {
-      id_.store(gettid());
-      prepared_.set_value(prepare_servo_thread(runtime.config().settings.servo));
-      fault_ = runtime.loop().run(clock, stop_);
-    } catch (...) {  // only prepare_servo_thread() throws, before the loop runs
-      prepared_.set_exception(std::current_exception());
-    }
-    ended_.store(true);
-  }
-
-  ServiceNotify& service_;
-  std::promise<std::vector<RealtimeGrant>> prepared_;
-  std::atomic<bool> stop_{false};
-  std::atomic<bool> ended_{false};
-  std::atomic<pid_t> id_{0};
-  Fault fault_ = Fault::none;  ///< valid after join()
-  std::thread thread_;         ///< last member: it uses all of the above
+  const RunContext& context_;
 };
 
 /// Logs that real time was lost or regained. If real time is required, its loss disarms the loop.
@@ -105,18 +81,12 @@ class ContactRateLog {
 Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::string& device, TimePoint end,
                        WallClock& clock, LiveView& view, ScheduledRequests& requests) {
   ServoLoop& loop = runtime.loop();
-  ServoThread servo_thread(runtime, clock, context.service);
-  log_grants(servo_thread.grants());
-  context.service.running(
-      [&loop] {
-        return LoopStatus{loop.telemetry().state(), loop.telemetry().cause(),
-                          loop.telemetry().timing().tick.count()};
-      },
-      device);
-  RealtimeWatch realtime(servo_thread.id());
+  const std::unique_ptr<RunningLoop> running = start_loop(runtime, context, clock);
+  const ServiceStatus service_status(loop, context, device);
+  RealtimeWatch realtime(running->thread());
   ContactRateLog contact_rate(runtime);
   ThreadGuard guard("supervision of the loop");
-  while (!context.signals.stop_requested() && !servo_thread.ended() && clock.now() < end) {
+  while (!context.stop_requested() && !running->ended() && clock.now() < end) {
     std::this_thread::sleep_until(requests.next_time(clock.now() + kSamplePeriod));
     requests.send_due(loop, clock.now());
     guard.run([&] { view.sample(loop); });
@@ -126,8 +96,8 @@ Fault run_in_wall_time(Runtime& runtime, const RunContext& context, const std::s
     });
   }
   const Fault latched = latched_fault(loop);
-  if (!servo_thread.ended()) context.service.stopping("stopping");
-  const Fault fault = servo_thread.join();
+  if (!running->ended()) context.service.stopping("stopping");
+  const Fault fault = running->join();
   contact_rate.close();
   return fault == Fault::none ? latched : fault;
 }

@@ -11,8 +11,9 @@
 
 namespace wrenchd {
 
-/// Runs the servo loop on a real-time thread of its own until `end`, a signal or a fault that ends the loop.
-/// Meanwhile the calling thread sends the requests, updates the live view and watches the real-time state.
+/// Runs the servo loop on a real-time thread, its own or that of two hands, until `end`, a signal or a fault
+/// that ends the loop. Meanwhile the calling thread sends the requests, updates the live view and watches the
+/// real-time state.
 ///
 /// device: name for the service manager. Returns the fault that ended or latched the loop, else Fault::none.
 /// Throws RealtimeError if real time is required and the kernel denies it. Not RT-safe: returns when the run

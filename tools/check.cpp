@@ -102,10 +102,13 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
     case Kind::settings:
       break;
   }
-  const RunConfig plan = load_run_config({file, {}, {}, false}, SearchPath());
-  return file.string() + ": valid configuration\n" +
-         (plan.profile.name.empty() ? "profile: that of the connected device\n" : about(plan.profile)) +
-         about(plan.scene, plan.settings.servo.rate_Hz, meshes);
+  std::string text = file.string() + ": valid configuration\n";
+  for (const RunConfig& plan : load_run_configs({file, {}, {}, false}, SearchPath())) {
+    if (plan.is_second) text += "second hand " + plan.hand() + ":\n";
+    text += (plan.profile.name.empty() ? "profile: that of the connected device\n" : about(plan.profile)) +
+            about(plan.scene, plan.settings.servo.rate_Hz, meshes);
+  }
+  return text;
 }
 
 std::string check_against_descriptor(const std::filesystem::path& profile, const DescriptorSource& device) {

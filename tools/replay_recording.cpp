@@ -12,6 +12,11 @@
 namespace wrenchd {
 bool replay_recording(const std::filesystem::path& file, const std::optional<RunConfigFiles>& files) {
   const Recording recording = read_recording(file);
+  if (recording.header.hands > 1)
+    throw std::runtime_error(file.string() +
+                             ": is a recording of a run with two hands, and a replay computes one hand "
+                             "alone; record a run without "
+                             "[[hand]] to replay it");
   std::optional<RecordedRun> recorded;
   RunConfig plan;
   if (files) {

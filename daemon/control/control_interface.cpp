@@ -17,7 +17,7 @@ ControlInterface::ControlInterface(Runtime& runtime, EventFeed& feed)
 void ControlInterface::open(const std::filesystem::path& path, const IdentifyPeer& identify) {
   const Settings& settings = runtime_.config().settings;
   const RoleRules rules = load_role_rules(settings.control, settings.file.string());
-  listening_socket_.emplace(path, rules);
+  listening_socket_.emplace(path, rules, !runtime_.config().is_second);
   control_socket_.emplace(*listening_socket_, rules, methods_, feed_, lease_, identify);
 }
 

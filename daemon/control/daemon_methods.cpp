@@ -336,6 +336,7 @@ Json status_json(const DaemonContext& context) {
   const auto scene = context.runtime.reconfigurator().present_scene();
   Json status = state_json(context, now);
   status.update({{"version", kVersion},
+                 {"hand", config.is_second ? Json(config.hand()) : Json(nullptr)},
                  {"tick", timing.tick.count()},
                  {"device",
                   {{"profile", config.profile.name},

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <chrono>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "daemon/control/event_description.hpp"
 #include "daemon/event_journal.hpp"
+#include "daemon/log_prefix.hpp"
 #include "daemon/servo/servo_loop.hpp"
 
 namespace wrenchd {
@@ -94,8 +96,8 @@ std::span<const EventRow> feed_events() {
   return rows;
 }
 
-EventFeed::EventFeed(ServoLoop& loop)
-    : loop_(loop), thread_([this](const std::stop_token& stop) {
+EventFeed::EventFeed(ServoLoop& loop, std::string hand)
+    : loop_(loop), hand_(std::move(hand)), thread_([this](const std::stop_token& stop) {
         ThreadGuard guard("event feed");
         while (!stop.stop_requested()) {
           guard.run([this] { drain(); });
@@ -133,6 +135,7 @@ void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, 
   history_.push_back(
       {at, source == Source::loop, name, level, text, fields, notification_line("event", params)});
   if (history_.size() > kHistorySize) history_.pop_front();
+  const LogPrefix prefix(hand_);
   spdlog::log(log_level(level), "{}", text);
   if (wake_fd_ < 0) return;
   const std::uint64_t one = 1;

@@ -58,7 +58,8 @@ struct FeedEvent {
 /// logs.
 class EventFeed {
  public:
-  explicit EventFeed(ServoLoop& loop);
+  /// hand: its log lines begin with this name; empty: the first hand, which has none.
+  explicit EventFeed(ServoLoop& loop, std::string hand = {});
   /// Publishes the events that are left in the ring.
   ~EventFeed();
   EventFeed(const EventFeed&) = delete;
@@ -111,6 +112,7 @@ class EventFeed {
   void append_device_event(TimePoint at, State from, State to);
 
   ServoLoop& loop_;
+  const std::string hand_;
   std::mutex drain_mutex_;              ///< the ring permits one reader at a time
   std::uint64_t dropped_reported_ = 0;  ///< dropped events that were reported
   bool device_was_present_ = false;

@@ -95,8 +95,8 @@ SocketPath choose_socket_path(const std::string& command_line, const ControlSett
   return {fs::path("/run/wrenchd") / kFile, false};
 }
 
-ListeningSocket::ListeningSocket(const fs::path& path, const RoleRules& rules) : path_(path) {
-  if (adopt_from_systemd()) return;
+ListeningSocket::ListeningSocket(const fs::path& path, const RoleRules& rules, bool adopt) : path_(path) {
+  if (adopt && adopt_from_systemd()) return;
   check_directory(path_.parent_path());
   lock_path();
   remove_stale_socket();

@@ -31,8 +31,9 @@ SocketPath choose_socket_path(const std::string& command_line, const ControlSett
 /// systemd passes (LISTEN_FDS) is used unchanged.
 class ListeningSocket {
  public:
-  /// Throws std::runtime_error; the message names path and cure.
-  ListeningSocket(const std::filesystem::path& path, const RoleRules& rules);
+  /// adopt: uses a socket that systemd passes. Of two sockets of one process only the first does. Throws
+  /// std::runtime_error; the message names path and cure.
+  ListeningSocket(const std::filesystem::path& path, const RoleRules& rules, bool adopt = true);
   /// Removes the socket file, if the constructor created it.
   ~ListeningSocket();
   ListeningSocket(const ListeningSocket&) = delete;

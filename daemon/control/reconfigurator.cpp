@@ -138,6 +138,15 @@ Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& s
   return built;
 }
 
+/// Both hands render one scene, and nothing exchanges the renderings of two loops in the same tick.
+void Reconfigurator::reject_with_two_hands() const {
+  if (config_.two_hands())
+    throw std::invalid_argument(
+        "two hands share the scene and its rendering, which do not change while they run; change the file "
+        "and "
+        "start wrenchd again");
+}
+
 /// The bodies of a scene that is built again start at rest where they are now.
 void Reconfigurator::keep_bodies(SceneSettings& scene) {
   const BodyPoses X_WB = loop_.telemetry().handle_pose().X_WB;
@@ -198,6 +207,7 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
 
 void Reconfigurator::replace_scene(const std::filesystem::path& file, const FileScope& scope) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   SceneSettings scene = load_scene(file, scope);
   scene.smoothing_m = config_.settings.rendering.smoothing_m;
   std::string text = scene.text;
@@ -212,6 +222,7 @@ void Reconfigurator::replace_scene(const std::filesystem::path& file, const File
 std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source,
                                             const FileScope& scope) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   SceneSettings scene = config_.scene;
   const std::size_t half_spaces = scene.half_spaces.size();
   add_obstacle(obstacle, source, scene, scope);
@@ -231,6 +242,7 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
 
 void Reconfigurator::remove_obstacle(const std::string& name) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
@@ -268,6 +280,7 @@ void Reconfigurator::wait_until_idle() {
 
 void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, double duration_s) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   const auto mesh = std::find_if(scene.meshes.begin(), scene.meshes.end(), is_it);
@@ -304,6 +317,7 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
 std::vector<ChangedValue> Reconfigurator::set_rendering(const TomlNode& changes,
                                                         const std::filesystem::path& source) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   Settings settings = config_.settings;
   change_rendering(changes, source, settings);
   std::vector<ChangedValue> changed = changed_values(config_.settings, settings);
@@ -438,6 +452,7 @@ Reconfigurator::ReloadedScene Reconfigurator::reload_scene(const SceneSettings& 
 
 ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const std::lock_guard lock(mutex_);
+  reject_with_two_hands();
   const RunConfig config = read();
   ReloadedSettings settings = reload_settings(config.settings);
   SceneSettings new_scene = config.scene;
@@ -445,6 +460,7 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   ReloadedScene scene = reload_scene(new_scene);
   if (is_profile_changed(config))
     settings.not_applied.emplace_back("the device profile was changed: requires a restart");
+  if (config.two_hands()) settings.not_applied.emplace_back("hand: requires a restart");
   if (scene.changed) {
     settings.present.scene = settings.from_files.scene = config.settings.scene;
     settings.applied.emplace_back("scene");

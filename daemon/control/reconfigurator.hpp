@@ -36,7 +36,8 @@ struct ReloadResult {
 ///
 /// Each change is read, checked, built and warmed up on the calling thread; then the loop receives the
 /// complete rendering. A change with an error changes nothing: it throws ConfigError (file, line and cure),
-/// MeshError, std::invalid_argument or BusyError.
+/// MeshError, std::invalid_argument or BusyError. With two hands in the process, scene and rendering do not
+/// change: these functions throw std::invalid_argument.
 ///
 /// Any thread except the servo thread; calls wait for each other. Not RT-safe: reading meshes may take
 /// seconds.
@@ -162,6 +163,7 @@ class Reconfigurator {
     BuiltScene built;
   };
 
+  void reject_with_two_hands() const;
   void keep_bodies(SceneSettings& scene);
   BuiltScene with_smoothing(SceneSettings& scene, double smoothing_m);
   double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }

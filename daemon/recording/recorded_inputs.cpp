@@ -3,9 +3,11 @@
 
 #include <chrono>
 #include <fstream>
+#include <utility>
 
 #include <sys/utsname.h>
 
+#include "config/inherited_toml.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
@@ -115,6 +117,26 @@ void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& 
     mesh->node.value = mesh_at(header, role, directory).string();
 }
 
+/// Removes [[hand]]. If the ticks are those of the second hand, its sections take the place of those of the
+/// first one. The scene and the profile of the recording are those of this hand already.
+void choose_hand(TomlNode& tree, const RecordingHeader& header) {
+  auto* const entries = std::get_if<TomlNode::Table>(&tree.value);
+  TomlEntry* const found = find(tree, "hand");
+  if (entries == nullptr || found == nullptr) return;
+  TomlNode hands = std::move(found->node);
+  std::erase_if(*entries, [](const TomlEntry& entry) { return entry.key == "hand"; });
+  auto* const list = std::get_if<TomlNode::Array>(&hands.value);
+  if (header.hand.empty() || list == nullptr || list->empty()) return;
+  for (const char* const section : {"device", "limits", "simulation"}) {
+    TomlEntry* const own = find(list->front(), section);
+    auto* const values = own == nullptr ? nullptr : std::get_if<TomlNode::Table>(&own->node.value);
+    auto* const common = std::get_if<TomlNode::Table>(&table_in(tree, section)->value);
+    if (values == nullptr || common == nullptr) continue;
+    merge_over(*values, std::move(*common));
+    *common = std::move(*values);
+  }
+}
+
 SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory) {
   TomlNode tree = read_toml_text(header.scene, header.scene_file);
   if (TomlEntry* const tool = find(tree, "tool")) put_mesh(tool->node, header, "tool", directory);
@@ -171,6 +193,8 @@ RecordingHeader read_recorded_texts(const RunConfig& config) {
   header.files.push_back(
       {"hand_script", config.settings.simulation.hand_script, {}, true, config.settings.hand_script_text});
   header.realtime = word(config.settings.servo.realtime);
+  header.hands = config.two_hands() ? 2 : 1;
+  header.hand = config.hand();
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
   return header;
@@ -213,6 +237,7 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   config.profile = profile_of(header, directory);
   config.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
+  choose_hand(tree, header);
   write(directory / "scene.toml", header.scene);
   set(&tree, "scene", (directory / "scene.toml").string());
   set(table_in(tree, "device"), "profile",

@@ -14,6 +14,7 @@
 #include "config/calibration_store.hpp"
 #include "config/toml_file.hpp"
 #include "core/fault.hpp"
+#include "daemon/hand_file.hpp"
 
 namespace wrenchd {
 namespace {
@@ -125,29 +126,34 @@ OwnedFd open_recording(const fs::path& directory, const std::string& name) {
                        ": is no readable recording; there are: " + (there.empty() ? "none" : there));
 }
 
-fs::path flight_path(const fs::path& directory, std::time_t utc, std::string_view fault) {
+fs::path flight_path(const fs::path& directory, std::time_t utc, std::string_view fault,
+                     const std::string& hand) {
   const std::string name = kFlight + utc_stamp(utc) + "-" + std::string(fault);
+  const auto path = [&](const std::string& number) {
+    return file_of_hand(directory / (name + number + ".h5"), hand);
+  };
   std::error_code ignored;
-  fs::path file = directory / (name + ".h5");
-  for (int i = 2; fs::exists(file, ignored); ++i) file = directory / (name + "-" + std::to_string(i) + ".h5");
+  fs::path file = path("");
+  for (int i = 2; fs::exists(file, ignored); ++i) file = path("-" + std::to_string(i));
   return file;
 }
 
-bool is_flight_name(const std::string& name) {
+bool is_flight_name(const std::string& name, const std::string& hand) {
   static const std::regex form = [] {
     std::string faults;
     for (const FaultRow& row : fault_rows()) faults += (faults.empty() ? "" : "|") + std::string(row.name);
-    return std::regex(kFlight + ("[0-9]{8}T[0-9]{6}Z-(" + faults) + ")(-[0-9]+)?\\.h5");
+    return std::regex(kFlight + ("[0-9]{8}T[0-9]{6}Z-(" + faults) + ")(-[0-9]+)?");
   }();
-  return std::regex_match(name, form);
+  const std::string end = (hand.empty() ? "" : "-" + hand) + ".h5";
+  return name.ends_with(end) && std::regex_match(name.substr(0, name.size() - end.size()), form);
 }
 
-void prune_flights(const fs::path& directory, std::size_t most) {
+void prune_flights(const fs::path& directory, std::size_t most, const std::string& hand) {
   std::vector<fs::path> flights;
   std::error_code error;
   for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
-    if (is_flight_name(name) && at->is_regular_file(error)) flights.push_back(at->path());
+    if (is_flight_name(name, hand) && at->is_regular_file(error)) flights.push_back(at->path());
   }
   std::sort(flights.begin(), flights.end());  // the names sort by time
   for (std::size_t i = 0; i + most < flights.size(); ++i) fs::remove(flights[i], error);

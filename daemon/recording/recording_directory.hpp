@@ -48,14 +48,17 @@ std::vector<StoredRecording> stored_recordings(const std::filesystem::path& dire
 /// Opens a recording for reading. Throws RecordingError.
 OwnedFd open_recording(const std::filesystem::path& directory, const std::string& name);
 
+// The files of the flight recorder. hand: name of the second hand, which ends the names of its files; empty:
+// the first hand.
+
 /// Returns an unused path for a file of the flight recorder: "flight-20261122T141501Z-overspeed.h5".
 std::filesystem::path flight_path(const std::filesystem::path& directory, std::time_t utc,
-                                  std::string_view fault);
+                                  std::string_view fault, const std::string& hand = {});
 /// Returns true if a file name has the form that flight_path() gives: "flight-20261122T141501Z-overspeed.h5",
 /// with the name of a fault, and a number if several have the same time and fault.
-bool is_flight_name(const std::string& name);
-/// Removes the oldest files of the flight recorder until at most `most` are left. Keeps all other files,
-/// also those whose name only begins with "flight-".
-void prune_flights(const std::filesystem::path& directory, std::size_t most);
+bool is_flight_name(const std::string& name, const std::string& hand = {});
+/// Removes the oldest files of this hand's flight recorder until at most `most` are left. Keeps all other
+/// files, also those whose name only begins with "flight-".
+void prune_flights(const std::filesystem::path& directory, std::size_t most, const std::string& hand = {});
 
 }  // namespace wrenchd

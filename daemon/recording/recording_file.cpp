@@ -274,6 +274,10 @@ void write_header(hid_t file, const RecordingHeader& header) {
   write_text(file, "realtime", header.realtime);
   write_text(file, "clock", header.virtual_time ? "virtual" : "CLOCK_MONOTONIC");
   write_number(file, "rate_Hz", H5T_NATIVE_DOUBLE, &header.rate_Hz);
+  if (header.hands > 1) {
+    write_number(file, "hands", H5T_NATIVE_INT, &header.hands);
+    write_text(file, "hand", header.hand);
+  }
   write_text(file, "started_utc", utc(header.started_unix_ns));
   write_number(file, "started_unix_ns", H5T_NATIVE_INT64, &header.started_unix_ns);
   write_number(file, "started_ns", H5T_NATIVE_INT64, &header.started_ns);
@@ -577,6 +581,8 @@ RecordingHeader read_header(hid_t file, std::uint64_t file_bytes) {
   header.realtime = read_text(file, "realtime");
   header.virtual_time = read_text(file, "clock") == "virtual";
   header.rate_Hz = read_number(file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
+  header.hands = read_number<int>(file, "hands", H5T_NATIVE_INT, 1);
+  header.hand = read_text(file, "hand");
   header.started_ns = read_number<std::int64_t>(file, "started_ns", H5T_NATIVE_INT64, 0);
   header.started_unix_ns = read_number<std::int64_t>(file, "started_unix_ns", H5T_NATIVE_INT64, 0);
   read_files(file, file_bytes, header);

@@ -44,6 +44,8 @@ struct RecordingHeader {
   double rate_Hz = 0.0;             ///< Configured rate of the servo loop.
   std::string kernel;               ///< Name and release of the kernel.
   bool virtual_time = false;        ///< True if the run used virtual time.
+  int hands = 1;                    ///< Number of hands of the run; a recording has the ticks of one hand.
+  std::string hand;                 ///< Name of the hand of these ticks; empty: the first hand.
   // One moment on two clocks: unix_ns = started_unix_ns + (now_ns - started_ns).
   std::int64_t started_ns = 0;       ///< Start of the recording, on the clock of the ticks.
   std::int64_t started_unix_ns = 0;  ///< Start of the recording, UTC since 1970.
@@ -80,7 +82,8 @@ struct RecordBatch {
 ///   /meshes     contents of the mesh files tool, obstacle_0, ..., body_0, ..., with path and SHA-256
 ///
 /// Unit, frame and meaning of column X are also the attributes "X.unit", "X.frame" and "X.doc" of its table.
-/// Attributes of the file: format, versions, rate, and start time on the clock of the ticks and in UTC.
+/// Attributes of the file: format, versions, rate, and start time on the clock of the ticks and in UTC. If
+/// two hands ran: their number, and the name of the hand that has these ticks.
 ///
 /// Flushed data survive if the process dies. For one thread at a time. Not RT-safe: writes a file.
 class RecordingWriter {

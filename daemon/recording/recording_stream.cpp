@@ -60,14 +60,15 @@ class Reader {
 RecordingHeader read_header(std::string_view bytes) {
   Reader in(bytes);
   RecordingHeader header;
-  for (std::string* text :
-       {&header.version, &header.settings, &header.scene, &header.profile, &header.realtime, &header.kernel})
+  for (std::string* text : {&header.version, &header.settings, &header.scene, &header.profile,
+                            &header.realtime, &header.kernel, &header.hand})
     *text = in.text();
   for (std::filesystem::path* path : {&header.settings_file, &header.scene_file, &header.profile_file})
     *path = in.text();
   const std::uint64_t rate = in.number();
   std::memcpy(&header.rate_Hz, &rate, sizeof rate);
   header.virtual_time = in.number() != 0;
+  header.hands = static_cast<int>(in.number());
   header.started_ns = static_cast<std::int64_t>(in.number());
   header.started_unix_ns = static_cast<std::int64_t>(in.number());
   while (!in.at_end()) {
@@ -195,8 +196,8 @@ void RecordingSender::message(std::uint8_t kind, const void* data, std::size_t b
 
 void RecordingSender::send(const RecordingHeader& header) {
   std::string out;
-  for (const std::string* text :
-       {&header.version, &header.settings, &header.scene, &header.profile, &header.realtime, &header.kernel})
+  for (const std::string* text : {&header.version, &header.settings, &header.scene, &header.profile,
+                                  &header.realtime, &header.kernel, &header.hand})
     append(out, *text);
   for (const std::filesystem::path* path : {&header.settings_file, &header.scene_file, &header.profile_file})
     append(out, path->string());
@@ -204,6 +205,7 @@ void RecordingSender::send(const RecordingHeader& header) {
   std::memcpy(&rate, &header.rate_Hz, sizeof rate);
   append(out, rate);
   append(out, std::uint64_t{header.virtual_time});
+  append(out, static_cast<std::uint64_t>(header.hands));
   append(out, static_cast<std::uint64_t>(header.started_ns));
   append(out, static_cast<std::uint64_t>(header.started_unix_ns));
   for (const RecordedFile& file : header.files) {

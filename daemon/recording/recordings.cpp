@@ -7,6 +7,7 @@
 
 #include <pthread.h>
 
+#include "daemon/hand_file.hpp"
 #include "daemon/recording/recording_directory.hpp"
 #include "daemon/runtime.hpp"
 
@@ -96,7 +97,8 @@ void Recordings::close() noexcept {
 
 std::filesystem::path Recordings::start(const std::string& requested, bool anywhere) {
   const std::string name = requested.empty() ? "run-" + utc_stamp(utc_now()) : requested;
-  const std::filesystem::path file = recording_path(name, directory_, anywhere);
+  const std::filesystem::path file =
+      file_of_hand(recording_path(name, directory_, anywhere), runtime_.config().hand());
   if (file.parent_path() == directory_) make_recordings_directory(directory_);
   begin(file, file.parent_path());
   return file;
@@ -111,7 +113,7 @@ void Recordings::start_file(const std::filesystem::path& file) {
 }
 
 void Recordings::begin(const std::filesystem::path& file, const std::filesystem::path& directory) {
-  if (is_flight_name(file.filename().string()))
+  if (is_flight_name(file.filename().string(), runtime_.config().hand()))
     throw RecordingError(file.string() +
                          ": has the name of a file of the flight recorder, which removes its old files; "
                          "choose another name");
@@ -307,7 +309,8 @@ std::string Recordings::begin_flight(Fault fault, TimePoint at) {
   if (flight_) return flight_->recorder ? std::string() : flight_->file.string();
   const auto ago = std::chrono::duration_cast<std::chrono::seconds>(clock_.now() - at);
   Flight flight;
-  flight.file = flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name);
+  flight.file =
+      flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name, runtime_.config().hand());
   flight.fault = fault;
   // The number is taken now: until the writer begins, ticks may leave the history, and then they are counted.
   flight.from_ns = (at - from_seconds(flight_s_)).time_since_epoch().count();
@@ -331,7 +334,8 @@ bool Recordings::write_flight(bool rest) {
     if (!flight.recorder) {
       make_recordings_directory(directory_);
       check_free_space(directory_, settings_);
-      prune_flights(directory_, static_cast<std::size_t>(settings_.flights_kept - 1));
+      prune_flights(directory_, static_cast<std::size_t>(settings_.flights_kept - 1),
+                    runtime_.config().hand());
       const RecordingHeader header = runtime_.recording_header();
       flight.end = history_.first_at_or_after(flight.until_ns + 1);
       auto recorder = std::make_unique<Recorder>(history_, flight.file, header, flight.first);

@@ -56,6 +56,7 @@ class Recordings {
 
   /// Starts to write every tick to a file, and returns the file. requested: a name in the recordings
   /// directory; empty: a name with the present time. If `anywhere` is set, an absolute path is permitted too.
+  /// The name of the second hand is added to it, so that both hands may get the same name.
   /// Throws RecordingError, also if a recording is already running.
   std::filesystem::path start(const std::string& requested, bool anywhere);
   /// Starts to write every tick to this file. A relative path starts at the working directory.

@@ -29,24 +29,28 @@ Options shipped(std::vector<std::string> words = {}) {
   return parse(std::move(words));
 }
 
+/// The run configuration of the first hand.
+RunConfig config_of(const Options& options) {
+  return load_run_configs(options).front();
+}
+
 TEST_CASE("without options the configuration applies", "[options]") {
-  const RunConfig config = load_run_config(shipped());
+  const RunConfig config = config_of(shipped());
   CHECK(config.simulated);
   CHECK(config.settings.servo.realtime == Settings{}.servo.realtime);
   CHECK(config.settings.recording.file.empty());
 }
 
 TEST_CASE("options replace values of the configuration", "[options]") {
-  CHECK(load_run_config(shipped({"--realtime", "required"})).settings.servo.realtime == Realtime::required);
-  CHECK(load_run_config(shipped({"--realtime", "best_effort"})).settings.servo.realtime ==
-        Realtime::best_effort);
-  CHECK(load_run_config(shipped({"--record", "run.h5"})).settings.recording.file == "run.h5");
-  CHECK(load_run_config(shipped({"--simulate", "polhem"})).profile.name == "polhem");
+  CHECK(config_of(shipped({"--realtime", "required"})).settings.servo.realtime == Realtime::required);
+  CHECK(config_of(shipped({"--realtime", "best_effort"})).settings.servo.realtime == Realtime::best_effort);
+  CHECK(config_of(shipped({"--record", "run.h5"})).settings.recording.file == "run.h5");
+  CHECK(config_of(shipped({"--simulate", "polhem"})).profile.name == "polhem");
 }
 
 TEST_CASE("virtual time needs no real-time priority", "[options]") {
   const Options options = shipped({"--virtual-time", "--seconds", "1", "--realtime", "required"});
-  CHECK(load_run_config(options).settings.servo.realtime == Realtime::off);
+  CHECK(config_of(options).settings.servo.realtime == Realtime::off);
 }
 
 TEST_CASE("options that exclude each other, or are incomplete, are rejected", "[options]") {
@@ -60,7 +64,7 @@ TEST_CASE("options that exclude each other, or are incomplete, are rejected", "[
 TEST_CASE("options that the device does not support are rejected with the remedy", "[options]") {
   const auto rejection = [](const std::vector<std::string>& words) -> std::string {
     try {
-      load_run_config(shipped(words));
+      config_of(shipped(words));
     } catch (const std::runtime_error& error) {
       return error.what();
     }

@@ -64,6 +64,30 @@ TEST_CASE("SIGUSR1 stops the loop of the signal target, SIGUSR2 acknowledges", "
   }));
 }
 
+TEST_CASE("a signal reaches the loops of both hands, and a crash releases both", "[process_signals]") {
+  CHECK(holds_in_child([] {
+    const ProcessSignals signals;
+    VirtualRuntime first, second;
+    const SignalTarget target(first.runtime.loop());
+    std::optional<SignalTarget> target_of_second(std::in_place, second.runtime.loop());
+    const auto both = [&](State state) { return first.state() == state && second.state() == state; };
+    const auto tick = [&] { first.tick(), second.tick(); };
+    for (int i = 0; i < 100; ++i) tick();
+    if (!both(State::disarmed)) return false;
+    std::raise(SIGUSR1);
+    tick();
+    if (!both(State::stopped)) return false;
+    target_of_second.reset();
+    std::raise(SIGUSR2);
+    tick();
+    if (first.state() == State::stopped || second.state() != State::stopped) return false;
+    target_of_second.emplace(second.runtime.loop());
+    release_hand_before_exit();
+    return first.runtime.loop().telemetry().state() == State::shutdown &&
+           second.runtime.loop().telemetry().state() == State::shutdown;
+  }));
+}
+
 TEST_CASE("a signal without a target, before and after one, has no effect", "[process_signals]") {
   CHECK(holds_in_child([] {
     const ProcessSignals signals;

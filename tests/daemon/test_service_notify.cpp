@@ -92,6 +92,25 @@ TEST_CASE("reloading and stopping are reported once each", "[service_notify]") {
   CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=rejected: x.toml:1:1: no\n");
 }
 
+TEST_CASE("with two hands the service is ready when both are, and its status names both",
+          "[service_notify]") {
+  ServiceReport report;
+  report.add_second_hand("left");
+  report.running("a", 0);
+  CHECK(report.next_message(loop(State::disarmed, 1)) == "STATUS=disarmed; device a | left: starting\n");
+  report.waiting("no device is plugged in", 1);
+  CHECK(report.next_message(loop(State::disarmed, 2)) ==
+        "READY=1\nWATCHDOG=1\nSTATUS=disarmed; device a | left: waiting: no device is plugged in\n");
+  report.running("b", 1);
+  CHECK(report.next_message(loop(State::disarmed, 3), loop(State::disarmed, 1)) ==
+        "WATCHDOG=1\nSTATUS=disarmed; device a | left: disarmed; device b\n");
+  CHECK(report.next_message(loop(State::disarmed, 4), loop(State::disarmed, 1)) == "");  // one loop hangs
+  CHECK(report.next_message(loop(State::disarmed, 5), loop(State::disarmed, 2)) == "WATCHDOG=1\n");
+  report.stopping("stopping");
+  report.waiting("the device was unplugged", 1);
+  CHECK(report.next_message({}) == "STOPPING=1\nWATCHDOG=1\nSTATUS=stopping\n");
+}
+
 /// Replaces the service manager: a socket and the messages sent to it.
 class Manager {
  public:

@@ -483,6 +483,33 @@ struct Configured {
   }
 };
 
+TEST_CASE("with two hands scene and rendering do not change, workspace and local models do",
+          "[reconfigurator]") {
+  RunConfig plan = pressing_plan();
+  plan.second_hand = "left";
+  Rig rig(plan);
+  Reconfigurator& reconfigurator = rig.reconfigurator();
+  const auto rejected = [](const auto& change) {
+    try {
+      change();
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what()).find("change the file and start wrenchd again") != std::string::npos;
+    }
+    return false;
+  };
+  const auto file = rig.files.write("scene.toml", scene_text(kTable));
+  CHECK(rejected([&] { reconfigurator.replace_scene(file); }));
+  CHECK(rejected([&] { reconfigurator.insert_obstacle(TomlNode{{}, TomlNode::Table{}}, "x"); }));
+  CHECK(rejected([&] { reconfigurator.remove_obstacle("table"); }));
+  CHECK(rejected([&] { reconfigurator.move_obstacle("table", Pose{}, 1.0); }));
+  CHECK(rejected([&] { reconfigurator.set_rendering(TomlNode{{}, TomlNode::Table{}}, "x"); }));
+  CHECK(rejected([&] { reconfigurator.reload([] { return shipped_config(); }); }));
+  CHECK_NOTHROW(reconfigurator.set_scale(1.5));
+  CHECK_NOTHROW(reconfigurator.recentre());
+  CHECK_NOTHROW(reconfigurator.set_model({}, 1.0));
+  CHECK(reconfigurator.current_rendering().id == 0);
+}
+
 TEST_CASE("a reload applies all changes except those that require a restart", "[reconfigurator][reload]") {
   Configured c;
   Rig s(c.read());

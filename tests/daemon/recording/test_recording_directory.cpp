@@ -146,6 +146,25 @@ TEST_CASE("flight recordings are named by time and fault, and the oldest are rem
   prune_flights(files.path() / "none", 2);  // a directory that does not exist is no error
 }
 
+TEST_CASE("each hand keeps and removes the flights of its own", "[recording]") {
+  const TemporaryDirectory files;
+  const auto first = flight_path(files.path(), 1'800'000'000, "overspeed");
+  const auto left = flight_path(files.path(), 1'800'000'000, "overspeed", "left");
+  CHECK(left.filename() == first.stem().string() + "-left.h5");
+  files.write(first.filename(), "");
+  files.write(left.filename(), "");
+  const auto next = flight_path(files.path(), 1'800'000'000, "overspeed", "left");
+  CHECK(next.filename() == first.stem().string() + "-2-left.h5");
+  CHECK(is_flight_name(left.filename(), "left"));
+  CHECK(is_flight_name(next.filename(), "left"));
+  CHECK_FALSE(is_flight_name(left.filename()));
+  CHECK_FALSE(is_flight_name(left.filename(), "right"));
+  CHECK_FALSE(is_flight_name(first.filename(), "left"));
+  prune_flights(files.path(), 0, "left");
+  CHECK(std::filesystem::exists(first));
+  CHECK_FALSE(std::filesystem::exists(left));
+}
+
 TEST_CASE("only names that the flight recorder gives are removed as flights", "[recording]") {
   const TemporaryDirectory files;
   for (const char* mine : {"flight-9.h5", "flight-test.h5", "flight-20261122T141501Z.h5",

@@ -164,6 +164,8 @@ TEST_CASE("the header of a recording reads back as it was written", "[recording]
   header.rate_Hz = 4000.0;
   header.kernel = "Linux 6.1";
   header.virtual_time = true;
+  header.hands = 2;
+  header.hand = "left";
   header.started_ns = 12;
   header.started_unix_ns = 1'000'000'000'000'000'345;
   header.files = {{"hand_script", "/some/hand.toml", {}, true, "repeats = true"},
@@ -178,6 +180,8 @@ TEST_CASE("the header of a recording reads back as it was written", "[recording]
   CHECK(read.rate_Hz == 4000.0);
   CHECK(read.kernel == "Linux 6.1");
   CHECK(read.virtual_time);
+  CHECK(read.hands == 2);
+  CHECK(read.hand == "left");
   CHECK(read.started_ns == 12);
   CHECK(read.started_unix_ns == header.started_unix_ns);
   REQUIRE(read.files.size() == 3);

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo/two_loops.hpp"
+
+#include <cstdint>
+
+#include "daemon/servo/servo_loop.hpp"
+
+namespace wrenchd {
+
+TwoLoops::TwoLoops(TimePoint start, Duration period) noexcept : period_(period) {
+  hands_[0].due = start + period;
+  hands_[1].due = start + period + period / 2;
+}
+
+void TwoLoops::attach(std::size_t hand, ServoLoop& loop) noexcept {
+  Hand& to = hands_[hand];
+  to.ending.store(false, std::memory_order_relaxed);
+  to.fault.store(Fault::none, std::memory_order_relaxed);
+  to.loop.store(&loop, std::memory_order_release);
+}
+
+void TwoLoops::end(std::size_t hand) noexcept {
+  hands_[hand].ending.store(true, std::memory_order_relaxed);
+}
+
+bool TwoLoops::attached(std::size_t hand) const noexcept {
+  return hands_[hand].loop.load(std::memory_order_acquire) != nullptr;
+}
+
+Fault TwoLoops::fault(std::size_t hand) const noexcept {
+  return hands_[hand].fault.load(std::memory_order_relaxed);
+}
+
+void TwoLoops::step(Clock& clock) noexcept {
+  Hand& hand = hands_[1].due < hands_[0].due ? hands_[1] : hands_[0];
+  clock.sleep_until(hand.due);
+  ServoLoop* const loop = hand.loop.load(std::memory_order_acquire);
+  if (loop != nullptr) tick(hand, *loop, clock.now());
+  hand.due += period_;
+  const TimePoint now = clock.now();
+  if (now <= hand.due) return;
+  const auto missed = (now - hand.due) / period_ + 1;
+  hand.due += missed * period_;
+  // A loop that has just ended may be destroyed already.
+  if (loop != nullptr && hand.loop.load(std::memory_order_relaxed) == loop)
+    loop->telemetry().count_overrun(static_cast<std::uint64_t>(missed));
+}
+
+void TwoLoops::tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept {
+  const auto ended = [&hand](Fault fault) {
+    hand.fault.store(fault, std::memory_order_relaxed);
+    hand.loop.store(nullptr, std::memory_order_release);
+  };
+  if (hand.ending.load(std::memory_order_relaxed)) {
+    if (loop.telemetry().state() == State::shutdown) return ended(Fault::none);
+    loop.requests().request(kQuit);
+  }
+  if (loop.tick(now, hand.due) == Fault::device_lost) ended(Fault::device_lost);  // the hand was released
+}
+
+void TwoLoops::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
+  while (!stop.load(std::memory_order_relaxed) || attached(0) || attached(1)) step(clock);
+}
+
+}  // namespace wrenchd
