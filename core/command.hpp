@@ -23,6 +23,7 @@ enum Command : CommandSet {
   kClientLost = 512,
   kGrasp = 1024,  ///< the tool holds the free body that it touches, or the first one that it will touch
   kLetGo = 2048,
+  kOtherHandReleased = 4096,  ///< a fault has released the other hand, which held the same body
 };
 
 }  // namespace wrenchd

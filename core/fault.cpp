@@ -220,6 +220,11 @@ constexpr std::array kRows = {
              "the device's watchdog did not trip when the host was silent",
              "only this watchdog frees the hand if the host dies",
              "repair the firmware, or remove watchdog_s from the profile, for a quarter of its force; then acknowledge"},
+    FaultRow{Fault::other_hand_released, "other_hand_released", T::hard_fault, R::zero, kImmediately,
+             "both tools hold the same body, and a fault has released the other hand",
+             "the other hand, which held the same body, was released by a fault",
+             "a body that two hands carry would pull at one of them with its whole weight at once",
+             "see the fault of the other hand; then acknowledge both"},
 };
 // clang-format on
 

@@ -71,8 +71,11 @@ enum class Fault : std::uint8_t {
   self_test_reports,   ///< no half second of valid reports during the self-test
   self_test_rate,      ///< the report rate differs from the profile
   self_test_watchdog,  ///< the device's watchdog did not trip in the self-test
+
+  // Two hands
+  other_hand_released,  ///< the other hand, which held the same body, was released by a fault
 };
-inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::self_test_watchdog) + 1;
+inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::other_hand_released) + 1;
 
 /// Description of one fault.
 struct FaultRow {

@@ -25,6 +25,7 @@
 #include "daemon/device_run.hpp"
 #include "daemon/device_start.hpp"
 #include "daemon/hand_file.hpp"
+#include "daemon/hand_scenes.hpp"
 #include "daemon/log_prefix.hpp"
 #include "daemon/output_queue.hpp"
 #include "daemon/realtime.hpp"
@@ -159,23 +160,37 @@ HandDevice make_device(const RunConfig& config, const RunContext& context, Clock
   return device;
 }
 
+MeshLoader mesh_loader() {
+  return MeshLoader(cache_directory(), [](const std::string& text) { spdlog::info("{}", text); });
+}
+
 /// One hand: its device, and everything that is built from its configuration.
 struct Hand {
-  Hand(RunConfig config, const RunContext& run_context, Clock& clock)
+  /// scene: of one of two hands, whose meshes `meshes` has read.
+  Hand(RunConfig config, const RunContext& run_context, Clock& clock,
+       const MeshLoader& meshes = mesh_loader(), const HandScene& scene = {})
       : context(run_context),
         device(make_device(config, context, clock)),
         runtime(std::move(config), *device.link, clock,
-                context.options.virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background,
-                MeshLoader(cache_directory(), [](const std::string& text) { spdlog::info("{}", text); })) {}
+                context.options.virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background, meshes,
+                scene) {}
 
   RunContext context;
   HandDevice device;
   Runtime runtime;
 };
 
-std::unique_ptr<Hand> make_hand(RunConfig config, const RunContext& context, Clock& clock) {
-  const LogPrefix prefix(config.hand());
-  return std::make_unique<Hand>(std::move(config), context, clock);
+/// Builds two hands in one world.
+std::array<std::unique_ptr<Hand>, 2> make_hands(const std::vector<RunConfig>& configs,
+                                                const std::array<RunContext, 2>& contexts, Clock& clock) {
+  MeshLoader meshes = mesh_loader();
+  const std::array<HandScene, 2> scenes = make_hand_scenes(configs[0], configs[1], meshes);
+  std::array<std::unique_ptr<Hand>, 2> hands;
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    const LogPrefix prefix(configs[i].hand());
+    hands[i] = std::make_unique<Hand>(configs[i], contexts[i], clock, meshes, scenes[i]);
+  }
+  return hands;
 }
 
 using RunLoop = std::function<Fault(Recordings&, LiveView&)>;
@@ -287,24 +302,25 @@ Fault run_one_in_virtual_time(RunConfig config, const RunContext& context) {
 }
 
 /// Both loops run on the calling thread, by one clock.
-Fault run_both_in_virtual_time(std::vector<RunConfig> configs, const RunContext& context) {
+Fault run_both_in_virtual_time(const std::vector<RunConfig>& configs, const RunContext& context) {
   VirtualClock clock;
   RunContext context_of_second = context;
   context_of_second.hand = 1;
-  const auto first = make_hand(std::move(configs[0]), context, clock);
-  const auto second = make_hand(std::move(configs[1]), context_of_second, clock);
+  const auto hands = make_hands(configs, {context, context_of_second}, clock);
+  Hand& first = *hands[0];
+  Hand& second = *hands[1];
   std::array<Fault, 2> faults{};
-  run_hand(*first, clock, [&](Recordings& recordings, LiveView& view) {
-    open_simulated(*first);
-    ScheduledRequests requests(context.options.arm, first->device.script.commands, clock.now());
-    run_hand(*second, clock, [&](Recordings& recordings_of_second, LiveView& view_of_second) {
-      open_simulated(*second);
+  run_hand(first, clock, [&](Recordings& recordings, LiveView& view) {
+    open_simulated(first);
+    ScheduledRequests requests(context.options.arm, first.device.script.commands, clock.now());
+    run_hand(second, clock, [&](Recordings& recordings_of_second, LiveView& view_of_second) {
+      open_simulated(second);
       ScheduledRequests requests_of_second(context.options.arm, {}, clock.now());
-      std::array<VirtualHand, 2> hands = {
-          VirtualHand{first->runtime, recordings, view, requests, first->context},
-          VirtualHand{second->runtime, recordings_of_second, view_of_second, requests_of_second,
-                      second->context}};
-      faults = run_two_in_virtual_time(hands, end_time(context.options, clock), clock);
+      std::array<VirtualHand, 2> virtual_hands = {
+          VirtualHand{first.runtime, recordings, view, requests, first.context},
+          VirtualHand{second.runtime, recordings_of_second, view_of_second, requests_of_second,
+                      second.context}};
+      faults = run_two_in_virtual_time(virtual_hands, end_time(context.options, clock), clock);
       return faults[1];
     });
     return faults[0];
@@ -388,9 +404,8 @@ Fault run_by_machine_clock(std::vector<RunConfig> configs, const RunContext& con
   first_context.two_hands = &shared;
   RunContext second_context = first_context;
   second_context.hand = 1;
-  const auto first = make_hand(std::move(configs[0]), first_context, clock);
-  const auto second = make_hand(std::move(configs[1]), second_context, clock);
-  return run_both_in_wall_time(*first, *second, shared, clock, end);
+  const auto hands = make_hands(configs, {first_context, second_context}, clock);
+  return run_both_in_wall_time(*hands[0], *hands[1], shared, clock, end);
 }
 
 }  // namespace
@@ -399,7 +414,7 @@ Fault run_daemon(std::vector<RunConfig> hands, const RunContext& context) {
   if (hands.size() > 1) context.service.add_second_hand(hands[1].hand());
   if (!context.options.virtual_time) return run_by_machine_clock(std::move(hands), context);
   if (hands.size() == 1) return run_one_in_virtual_time(std::move(hands[0]), context);
-  return run_both_in_virtual_time(std::move(hands), context);
+  return run_both_in_virtual_time(hands, context);
 }
 
 }  // namespace wrenchd

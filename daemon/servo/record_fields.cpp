@@ -146,8 +146,8 @@ static_assert(are_contiguous(kContactFields, sizeof(Touch), alignof(Touch)),
 /// Names of the bits of CommandSet, lowest bit first.
 constexpr std::array kCommandNames = {"arm",   "disarm", "reinitialize proxy", "stop",    "acknowledge",
                                       "quit",  "lease",  "heartbeat",          "release", "client lost",
-                                      "grasp", "let go"};
-static_assert(kCommandNames.size() == std::bit_width(unsigned{kLetGo}));
+                                      "grasp", "let go", "other hand released"};
+static_assert(kCommandNames.size() == std::bit_width(unsigned{kOtherHandReleased}));
 
 template <class Name>
 std::vector<std::string> names_of(std::size_t count, const Name& name_of) {

@@ -371,7 +371,6 @@ CalmCondition Renderer::calm_condition(const ContactState& contact, const Device
 
 void Renderer::forget_device() noexcept {
   crossfade_.reset_law();
-  crossfade_.active().leave_shared_world();
   undriven_.reset();
   has_sample_time_ = false;
 }

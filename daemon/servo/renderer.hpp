@@ -51,6 +51,8 @@ class Renderer {
   Demand compute_wrench(const ContactState& contact, const DeviceSample& sample, const Verdict& verdict,
                         const RenderingCrossfade::FadeLimits& limits, const TickTime& t) noexcept;
 
+  /// In a world of two hands: takes the tool of a hand without a device out of it.
+  void leave_shared_world() noexcept { crossfade_.active().leave_shared_world(); }
   /// The next device may be another, with another clock: resets the wrench laws.
   void forget_device() noexcept;
 

@@ -57,6 +57,8 @@ class RequestInbox {
   void grasp() noexcept { request(kGrasp); }
   /// The tool lets go of the body that it holds, and holds none that it touches from now on.
   void let_go() noexcept { request(kLetGo); }
+  /// A fault has released the other hand, which held the same body: this hand is released as well. RT-safe.
+  void release_with_other_hand() noexcept { request(kOtherHandReleased); }
 
   /// Changes scale, clutch or centre of the workspace (daemon/servo/workspace.hpp) without a jump of the
   /// wrench.

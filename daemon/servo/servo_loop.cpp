@@ -92,6 +92,7 @@ void ServoLoop::release(TimePoint now) noexcept {
 Fault ServoLoop::leave(const TickTime& t, const Requests& asked, const DeviceReading& in,
                        const Written& last_write, TimePoint ready) noexcept {
   if (last_write.device_lost()) supervisor_.lose_device(t);
+  renderer_.leave_shared_world();
   Written released = port_.release(t.now);
   released.result = last_write.result;
   forget_device();

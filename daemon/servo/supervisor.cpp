@@ -72,6 +72,7 @@ void Supervisor::run_self_test(const DeviceSample& sample, Verdict& verdict, con
 void Supervisor::apply_commands(CommandSet commands, bool proxy_valid, Verdict& verdict,
                                 const TickTime& t) noexcept {
   if ((commands & kStop) != 0) raise(Fault::stop_requested, t.now);
+  if ((commands & kOtherHandReleased) != 0) raise(Fault::other_hand_released, t.now);
   if ((commands & kAcknowledge) != 0 && (commands & kStop) == 0) machine_.on(Trigger::acknowledge);
   if ((commands & kQuit) != 0) machine_.on(Trigger::quit);
   if ((commands & kDisarm) != 0) machine_.on(Trigger::disarm);

@@ -1,11 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/servo/two_loops.hpp"
 
+#include <cstddef>
 #include <cstdint>
 
+#include "core/state.hpp"
 #include "daemon/servo/servo_loop.hpp"
 
 namespace wrenchd {
+
+void release_other_hand(const ServoLoop& loop, std::size_t held_before, ServoLoop& other) noexcept {
+  const State state = loop.telemetry().state();
+  const bool released = state == State::fault || state == State::stopped || state == State::disconnected;
+  const bool armed = is_driving(other.telemetry().state()) || other.telemetry().state() == State::waiting;
+  if (released && armed && held_before != 0 && other.held_body() == held_before)
+    other.requests().release_with_other_hand();
+}
 
 TwoLoops::TwoLoops(TimePoint start, Duration period) noexcept : period_(period) {
   hands_[0].due = start + period;
@@ -55,7 +65,12 @@ void TwoLoops::tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept {
     if (loop.telemetry().state() == State::shutdown) return ended(Fault::none);
     loop.requests().request(kQuit);
   }
-  if (loop.tick(now, hand.due) == Fault::device_lost) ended(Fault::device_lost);  // the hand was released
+  const std::size_t held = loop.held_body();
+  const Fault fault = loop.tick(now, hand.due);
+  Hand& other = &hand == &hands_[0] ? hands_[1] : hands_[0];
+  if (ServoLoop* const other_loop = other.loop.load(std::memory_order_acquire); other_loop != nullptr)
+    release_other_hand(loop, held, *other_loop);
+  if (fault == Fault::device_lost) ended(Fault::device_lost);  // the hand was released
 }
 
 void TwoLoops::run(Clock& clock, const std::atomic<bool>& stop) noexcept {

@@ -12,6 +12,10 @@ namespace wrenchd {
 
 class ServoLoop;
 
+/// Releases the other hand after a tick that released a hand by a fault, if both tools held the same body
+/// before it. held_before: number of the body that the tool of `loop` held before the tick; 0: none. RT-safe.
+void release_other_hand(const ServoLoop& loop, std::size_t held_before, ServoLoop& other) noexcept;
+
 /// Ticks the servo loops of two hands in turn on one thread. The second loop ticks half a period after the
 /// first one: so no tick delays the other loop by more than its own length, and each tick has a fresh pose.
 ///
@@ -50,7 +54,7 @@ class TwoLoops {
     TimePoint due{};  ///< of the next tick; the servo thread only
   };
 
-  static void tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept;
+  void tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept;
 
   Duration period_;
   std::array<Hand, kHands> hands_;

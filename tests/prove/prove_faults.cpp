@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -33,11 +34,26 @@ void add_box(RunConfig& plan) {
   plan.scene.bodies.push_back(box);
 }
 
-/// Runs one schedule, which its seed determines completely.
-Outcome run(std::uint64_t seed, bool bodies) {
-  RandomValues random(seed);
-  FaultRig rig(static_cast<Phase>(random.integer(0, 2)),
-               bodies ? add_box : std::function<void(RunConfig&)>());
+/// Opens a lost device again, as the daemon does.
+void open_lost_device(FaultRig& rig) {
+  if (!rig.raised(Fault::device_lost)) return;
+  rig.faulty_device.write_result = Fault::none;
+  try {
+    rig.faulty_device.open();
+  } catch (const std::runtime_error&) {  // the device is still unplugged
+  }
+}
+
+/// The second hand: it holds and lets go, and is armed again after a fault.
+void act_on_other(FaultRig& other, RandomValues& random) {
+  RequestInbox& requests = other.loop.requests();
+  if (random.integer(0, 60) == 0) requests.request(random.integer(0, 1) == 0 ? kGrasp : kLetGo);
+  if (random.integer(0, 100) == 0) requests.request(random.integer(0, 1) == 0 ? kAcknowledge : kArm);
+  open_lost_device(other);
+}
+
+/// Runs a schedule on a rig. bodies: the hand may hold a body.
+Outcome run(RandomValues& random, FaultRig& rig, bool bodies) {
   const auto& states = rig_states();
   Outcome outcome;
   const State state =
@@ -55,13 +71,8 @@ Outcome run(std::uint64_t seed, bool bodies) {
         rig.loop.requests().request(random.integer(0, 1) == 0 ? kGrasp : kLetGo);
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
-      if (rig.raised(Fault::device_lost)) {  // the daemon also opens a lost device again
-        rig.faulty_device.write_result = Fault::none;
-        try {
-          rig.faulty_device.open();
-        } catch (const std::runtime_error&) {  // the device is still unplugged
-        }
-      }
+      open_lost_device(rig);
+      if (rig.other != nullptr) act_on_other(*rig.other, random);
     }
   };
   const int faults = random.integer(1, 4);
@@ -80,16 +91,59 @@ Outcome run(std::uint64_t seed, bool bodies) {
     if (i % 500 == 0) rig.loop.requests().request(kAcknowledge);
     rig.loop.requests().request(kDisarm);
     rig.tick();
-    if (!rig.raised(Fault::device_lost)) continue;
-    try {
-      rig.faulty_device.open();
-    } catch (const std::runtime_error&) {
-    }
+    open_lost_device(rig);
   }
   outcome.broken = rig.violation();
   if (outcome.broken.empty() && rig.state() != State::disarmed)
     outcome.broken = std::string("does not recover: ") + name(rig.state());
   outcome.ticks = rig.last().tick + 1;
+  return outcome;
+}
+
+/// Two hands, 14 cm apart, that press the same plate and hold it at times.
+struct TwoRigs {
+  RigClock clock;
+  MeshLoader meshes;
+  RunConfig first_plan, second_plan;
+  std::array<HandScene, 2> scenes;
+  FaultRig first, second;
+
+  explicit TwoRigs(Phase phase)
+      : first_plan(FaultRig::plan(phase, [](RunConfig& plan) { place(plan, -0.07); })),
+        second_plan(FaultRig::plan(phase, [](RunConfig& plan) { place(plan, 0.07); })),
+        scenes(make_hand_scenes(first_plan, second_plan, meshes)),
+        first(first_plan, scenes[0], clock),
+        second(second_plan, scenes[1], clock) {}
+
+  static void place(RunConfig& plan, double x_m) {
+    add_box(plan);
+    plan.scene.bodies.back().shape.generated->size_m = {0.24, 0.08, 0.02};
+    for (Waypoint& waypoint : plan.settings.simulation.hand_path) waypoint.position_m.x() += x_m;
+  }
+};
+
+/// Runs one schedule, which its seed determines completely.
+Outcome run(std::uint64_t seed, bool bodies) {
+  RandomValues random(seed);
+  FaultRig rig(static_cast<Phase>(random.integer(0, 2)),
+               bodies ? add_box : std::function<void(RunConfig&)>());
+  return run(random, rig, bodies);
+}
+
+/// The same with two hands: faults of the first one, and commands for both.
+Outcome run_two_hands(std::uint64_t seed) {
+  RandomValues random(seed);
+  TwoRigs rigs(static_cast<Phase>(random.integer(0, 2)));
+  rigs.second.other = &rigs.first;
+  Outcome outcome;
+  if (!rigs.second.bring_to(State::active)) {
+    outcome.broken = "the second hand does not become active";
+    return outcome;
+  }
+  rigs.second.other = nullptr;
+  rigs.first.other = &rigs.second;
+  outcome = run(random, rigs.first, true);
+  if (outcome.broken.empty()) outcome.broken = rigs.second.violation();
   return outcome;
 }
 
@@ -104,12 +158,15 @@ int main(int argc, char** argv) {
   bool bodies = false;
   app.add_flag("--bodies", bodies,
                "the hand presses a box that moves by itself on the table, holds it and lets go");
+  bool two_hands = false;
+  app.add_flag("--two-hands", two_hands, "two hands press one plate, hold it and let go")
+      ->excludes("--bodies");
   CLI11_PARSE(app, argc, argv);
   std::uint64_t ticks = 0;
   long violations = 0;
   for (long i = 0; i < schedules; ++i) {
     const std::uint64_t one = seed * 1'000'003 + static_cast<std::uint64_t>(i);
-    const Outcome outcome = run(one, bodies);
+    const Outcome outcome = two_hands ? run_two_hands(one) : run(one, bodies);
     ticks += outcome.ticks;
     if (outcome.broken.empty()) continue;
     if (++violations <= 20)

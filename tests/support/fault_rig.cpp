@@ -3,6 +3,9 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "daemon/servo/two_loops.hpp"
 
 namespace wrenchd::test {
 namespace {
@@ -14,22 +17,6 @@ constexpr double kPressed_s = 0.5;  ///< time at which the hand has reached the 
 constexpr int kDeadman = 0;
 constexpr int kStopButton = 1;
 
-RunConfig rig_plan(Phase phase, const std::function<void(RunConfig&)>& adjust) {
-  RunConfig plan = shipped_config();
-  plan.settings.servo.realtime = Realtime::required;
-  plan.settings.servo.self_test_s = 0.03;
-  plan.settings.limits.soft_start_s = 0.05;
-  plan.settings.limits.max_force_N = phase == Phase::saturated ? 1.0 : 5.0;
-  plan.profile.deadman_button = kDeadman;
-  plan.profile.stop_button = kStopButton;
-  const double end_z_m = phase == Phase::free ? 0.06 : phase == Phase::contact ? 0.018 : -0.005;
-  plan.settings.simulation.hand_path = {
-      {0.0, {0, 0, 0.06}, {0, 0, 0}}, {0.3, {0, 0, 0.06}, {0, 0, 0}}, {0.42, {0, 0, end_z_m}, {0, 0, 0}}};
-  plan.settings.simulation.hand_repeats = false;
-  if (adjust) adjust(plan);
-  return plan;
-}
-
 Invariants::Limits limits_of(const RunConfig& plan) {
   return {plan.profile.max_force_N,
           plan.profile.max_torque_Nm,
@@ -38,7 +25,6 @@ Invariants::Limits limits_of(const RunConfig& plan) {
           1.0 / plan.settings.servo.rate_Hz,
           0.004};
 }
-
 bool armed(State s, Phase) {
   return is_driving(s) || s == State::waiting;
 }
@@ -59,27 +45,63 @@ const char* name(Phase phase) {
   return phase == Phase::free ? "free" : phase == Phase::contact ? "contact" : "saturated";
 }
 
+RunConfig FaultRig::plan(Phase phase, const std::function<void(RunConfig&)>& adjust) {
+  RunConfig plan = shipped_config();
+  plan.settings.servo.realtime = Realtime::required;
+  plan.settings.servo.self_test_s = 0.03;
+  plan.settings.limits.soft_start_s = 0.05;
+  plan.settings.limits.max_force_N = phase == Phase::saturated ? 1.0 : 5.0;
+  plan.profile.deadman_button = kDeadman;
+  plan.profile.stop_button = kStopButton;
+  const double end_z_m = phase == Phase::free ? 0.06 : phase == Phase::contact ? 0.018 : -0.005;
+  plan.settings.simulation.hand_path = {
+      {0.0, {0, 0, 0.06}, {0, 0, 0}}, {0.3, {0, 0, 0.06}, {0, 0, 0}}, {0.42, {0, 0, end_z_m}, {0, 0, 0}}};
+  plan.settings.simulation.hand_repeats = false;
+  if (adjust) adjust(plan);
+  return plan;
+}
+
 FaultRig::FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust)
-    : config(rig_plan(phase, adjust)),
-      scene(std::make_shared<const Scene>(config.scene)),
+    : FaultRig(plan(phase, adjust), HandScene{}, nullptr) {}
+
+FaultRig::FaultRig(RunConfig plan, const HandScene& hand, RigClock& shared_clock)
+    : FaultRig(std::move(plan), hand, &shared_clock) {}
+
+FaultRig::FaultRig(RunConfig plan, const HandScene& hand, RigClock* shared_clock)
+    : clock(shared_clock != nullptr ? *shared_clock : own_clock),
+      config(std::move(plan)),
+      scene(hand.scene ? hand.scene : std::make_shared<const Scene>(config.scene)),
       simulated(config.profile, config.settings.simulation),
       link(simulated, clock, config.settings.simulation),
       device(config.profile, link),
       faulty_device(device),
       proxy_initializer(std::make_shared<OverriddenProxyInitializer>(*scene)),
       loop(config.settings, config.profile, faulty_device,
-           std::make_unique<Rendering>(0, config.settings, config.profile, scene, proxy_initializer), clock),
+           std::make_unique<Rendering>(0, config.settings, config.profile, scene, proxy_initializer,
+                                       hand.tool),
+           clock),
       invariants_(limits_of(config)) {
   simulated.inject({Kind::press_button, Duration{0}, std::chrono::hours(1), kDeadman});
   faulty_device.open();
 }
 
 const TickRecord& FaultRig::tick(Duration after) {
-  clock.step(after);
+  const Duration half = other != nullptr ? after / 2 : Duration{0};
+  clock.step(after - half);
+  tick_alone(other);
+  if (other != nullptr) {
+    clock.step(half);
+    other->tick_alone(this);
+  }
+  return last_;
+}
+
+void FaultRig::tick_alone(FaultRig* partner) {
+  const std::size_t held = loop.held_body();
   loop.tick(clock.now(), clock.now());
+  if (partner != nullptr) release_other_hand(loop, held, partner->loop);
   loop.telemetry().latest_record().read(last_);
   if (const auto wrong = invariants_.check(last_); wrong && violation_.empty()) violation_ = *wrong;
-  return last_;
 }
 
 bool FaultRig::bring_to(State state) {
@@ -257,6 +279,8 @@ const std::vector<Injection>& injections() {
     add({"the stop button", Fault::stop_button, 1,
          spoil([](DeviceSample& s) { s.buttons |= 1U << kStopButton; })});
     add({"a stop is requested", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.requests().stop(); }});
+    add({"a fault releases the other hand", Fault::other_hand_released, 1,
+         [](FaultRig& r) { r.loop.requests().release_with_other_hand(); }});
     add({"what comes again and again",
          Fault::degraded_too_long,
          560,

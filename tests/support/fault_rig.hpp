@@ -105,8 +105,13 @@ class FaultRig {
  public:
   /// adjust: changes the configuration before the rig is built.
   explicit FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust = {});
+  /// One of two hands, which share the clock and the world of the scene.
+  FaultRig(RunConfig plan, const HandScene& hand, RigClock& shared_clock);
+  /// The configuration of a rig in this phase.
+  static RunConfig plan(Phase phase, const std::function<void(RunConfig&)>& adjust = {});
 
-  /// Advances the time and runs one tick. Returns its record.
+  /// Advances the time and runs one tick, and half a period later one of the other hand, if there is one.
+  /// Returns the record of this hand.
   const TickRecord& tick(Duration after = std::chrono::milliseconds(1));
   /// Runs ticks until the loop is in this state, while the hand does what the phase says. Returns false if
   /// the loop does not reach the state.
@@ -122,7 +127,9 @@ class FaultRig {
   /// Injects a simulated fault from now on, for `for_s` seconds.
   void inject(SimulatedFault::Kind kind, double for_s, double value = 0.0);
 
-  RigClock clock;
+  FaultRig* other = nullptr;  ///< the other hand; its tick() does not tick this one
+  RigClock own_clock;
+  RigClock& clock;
   RunConfig config;
   std::shared_ptr<const Scene> scene;
   SimulatedDevice simulated;
@@ -133,6 +140,9 @@ class FaultRig {
   ServoLoop loop;
 
  private:
+  FaultRig(RunConfig plan, const HandScene& hand, RigClock* shared_clock);
+  void tick_alone(FaultRig* partner);
+
   TickRecord last_;
   Invariants invariants_;
   std::string violation_;
