@@ -12,12 +12,12 @@ namespace wrenchd {
 namespace {
 
 /// The tool of a hand as the other hand sees it. It is far away until it enters the world.
-FreeBody as_body(const Scene& scene, const RunConfig& config) {
+FreeBody as_body(const Scene& scene, const RenderingSettings& rendering) {
   FreeBody body;
   body.name = "tool of the other hand";
   body.body = scene.tool();
   body.motion.X_WB.translation_m.z() = -SharedWorld::kFarBelow_m;
-  body.friction = config.settings.rendering.friction.dynamic_coefficient;
+  body.friction = rendering.friction.dynamic_coefficient;
   body.mesh = scene.shared_tool_mesh();
   body.of_hand = true;
   return body;
@@ -31,6 +31,10 @@ std::shared_ptr<const Scene> with_tool(const Scene& scene, FreeBody other) {
 
 }  // namespace
 
+std::shared_ptr<const Scene> with_equal_tool(const Scene& scene, const RenderingSettings& rendering) {
+  return with_tool(scene, as_body(scene, rendering));
+}
+
 std::array<HandScene, 2> make_hand_scenes(const RunConfig& first, const RunConfig& second,
                                           MeshLoader& loader) {
   constexpr std::size_t kMost = SceneSettings::kMaxBodies - 1;
@@ -40,8 +44,8 @@ std::array<HandScene, 2> make_hand_scenes(const RunConfig& first, const RunConfi
                              " [[body]] tables, because the other tool counts as one");
   const Scene a(first.scene, loader), b(second.scene, loader);
   HandScene one, other;
-  one.scene = with_tool(a, as_body(b, second));
-  other.scene = with_tool(b, as_body(a, first));
+  one.scene = with_tool(a, as_body(b, second.settings.rendering));
+  other.scene = with_tool(b, as_body(a, first.settings.rendering));
   const RenderingSettings& rendering = first.settings.rendering;
   const auto world =
       std::make_shared<SharedWorld>(*one.scene, rendering.friction.dynamic_coefficient, rendering.grasp);

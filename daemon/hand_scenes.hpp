@@ -17,6 +17,10 @@ struct HandScene {
   SharedTool tool;
 };
 
+/// Returns the scene with a second tool, which is that of the scene, as the last body. Not RT-safe:
+/// allocates.
+std::shared_ptr<const Scene> with_equal_tool(const Scene& scene, const RenderingSettings& rendering);
+
 /// Loads the scene of two hands, which differs in the tool only, and builds the world that they share. Throws
 /// MeshError; std::runtime_error if the scene has too many bodies. Not RT-safe: reads meshes, may take
 /// seconds.

@@ -117,16 +117,21 @@ void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& 
     mesh->node.value = mesh_at(header, role, directory).string();
 }
 
-/// Removes [[hand]]. If the ticks are those of the second hand, its sections take the place of those of the
-/// first one. The scene and the profile of the recording are those of this hand already.
-void choose_hand(TomlNode& tree, const RecordingHeader& header) {
+/// Removes [[hand]], and returns its name; empty if there is none. If the ticks are those of the second hand,
+/// its sections take the place of those of the first one. The scene and the profile of the recording are
+/// those of this hand already.
+std::string choose_hand(TomlNode& tree, const RecordingHeader& header) {
   auto* const entries = std::get_if<TomlNode::Table>(&tree.value);
   TomlEntry* const found = find(tree, "hand");
-  if (entries == nullptr || found == nullptr) return;
+  if (entries == nullptr || found == nullptr) return {};
   TomlNode hands = std::move(found->node);
   std::erase_if(*entries, [](const TomlEntry& entry) { return entry.key == "hand"; });
   auto* const list = std::get_if<TomlNode::Array>(&hands.value);
-  if (header.hand.empty() || list == nullptr || list->empty()) return;
+  if (list == nullptr || list->empty()) return {};
+  TomlEntry* const name = find(list->front(), "name");
+  const auto* const text = name == nullptr ? nullptr : std::get_if<std::string>(&name->node.value);
+  if (text == nullptr) return {};
+  if (header.hand.empty()) return *text;
   for (const char* const section : {"device", "limits", "simulation"}) {
     TomlEntry* const own = find(list->front(), section);
     auto* const values = own == nullptr ? nullptr : std::get_if<TomlNode::Table>(&own->node.value);
@@ -135,6 +140,7 @@ void choose_hand(TomlNode& tree, const RecordingHeader& header) {
     merge_over(*values, std::move(*common));
     *common = std::move(*values);
   }
+  return *text;
 }
 
 SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory) {
@@ -237,7 +243,8 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   config.profile = profile_of(header, directory);
   config.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
-  choose_hand(tree, header);
+  config.second_hand = choose_hand(tree, header);
+  config.is_second = !header.hand.empty();
   write(directory / "scene.toml", header.scene);
   set(&tree, "scene", (directory / "scene.toml").string());
   set(table_in(tree, "device"), "profile",
@@ -250,6 +257,14 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   config.scene.smoothing_m = config.settings.rendering.smoothing_m;
   config.simulated = config.profile.transport == Transport::loopback;
   return config;
+}
+
+bool hands_have_same_tool(const RecordingHeader& header) {
+  if (header.hands != 2) return false;
+  TomlNode tree = read_toml_text(header.settings, header.settings_file);
+  TomlEntry* const hand = find(tree, "hand");
+  auto* const list = hand == nullptr ? nullptr : std::get_if<TomlNode::Array>(&hand->node.value);
+  return list != nullptr && !list->empty() && find(list->front(), "tool") == nullptr;
 }
 
 }  // namespace wrenchd

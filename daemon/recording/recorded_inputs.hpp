@@ -31,4 +31,7 @@ void set_start_time(const Clock& clock, RecordingHeader& header);
 /// path. Throws RecordingError if a file is missing or has another SHA-256.
 RunConfig unpack_run_config(const RecordingHeader& header, const std::filesystem::path& directory);
 
+/// True if the recording is of one of two hands that have the same tool.
+bool hands_have_same_tool(const RecordingHeader& header);
+
 }  // namespace wrenchd

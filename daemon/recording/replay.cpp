@@ -3,7 +3,12 @@
 
 #include <array>
 #include <bit>
+#include <cstdint>
+#include <memory>
 #include <span>
+#include <string>
+
+#include "daemon/hand_scenes.hpp"
 
 namespace wrenchd {
 namespace {
@@ -95,7 +100,8 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
                                   std::span<const double> replayed) {
   for (std::size_t i = 0; i < recorded.size(); ++i)
     if (std::bit_cast<std::uint64_t>(recorded[i]) != std::bit_cast<std::uint64_t>(replayed[i]))
-      return Difference{tick, std::string(field) + '[' + std::to_string(i) + ']', recorded[i], replayed[i]};
+      return Difference{0, tick, std::string(field) + '[' + std::to_string(i) + ']', recorded[i],
+                        replayed[i]};
   return {};
 }
 
@@ -147,9 +153,86 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
   for (const Compared& number : kNumbers) {
     const double a = number.of(then), b = number.of(now);
     if (std::bit_cast<std::uint64_t>(a) != std::bit_cast<std::uint64_t>(b))
-      return Difference{then.tick, number.name, a, b};
+      return Difference{0, then.tick, number.name, a, b};
   }
   return {};
+}
+
+/// The replay of one hand, tick by tick.
+class HandReplay {
+ public:
+  /// The recording and the configuration must outlive this object. Throws RecordingError if the recording
+  /// does not begin at the first tick.
+  HandReplay(const Recording& recording, const RunConfig& config, const HandScene& hand)
+      : recording_(recording),
+        proxy_initializer_(std::make_shared<RecordedProxyInitializer>()),
+        loop_(config.settings, config.profile, device_,
+              std::make_unique<Rendering>(0, config.settings, config.profile, hand.scene, proxy_initializer_,
+                                          hand.tool),
+              clock_) {
+    if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
+      throw RecordingError(
+          "the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
+          ": a replay needs the state of the loop at its first tick (measured stiffness, motor "
+          "temperature, earlier faults, obstacle poses); replay a recording from the start of a "
+          "run, as wrenchd --record writes it");
+  }
+
+  bool ended() const noexcept { return next_ == recording_.ticks.size(); }
+  /// Time of the next tick. An external release has the time of the tick before, and comes after all ticks of
+  /// both hands. Precondition: not ended().
+  std::int64_t next_ns() const noexcept {
+    const TickRecord& next = recording_.ticks[next_];
+    return (next.commands & kReleasedExternally) != 0 ? INT64_MAX : next.now_ns;
+  }
+  /// Computes the next tick and compares it. Throws RecordingError if it is missing, or if a client made a
+  /// change that is not in the recording.
+  std::optional<Difference> step();
+
+ private:
+  void check_complete(const TickRecord& then);
+
+  const Recording& recording_;
+  std::size_t next_ = 0;
+  std::uint64_t last_tick_ = 0;  ///< an external release has the number of the previous tick
+  RecordedClock clock_;
+  RecordedDevice device_;
+  std::shared_ptr<RecordedProxyInitializer> proxy_initializer_;
+  ServoLoop loop_;
+};
+
+void HandReplay::check_complete(const TickRecord& then) {
+  if (then.tick != last_tick_ && then.tick != last_tick_ + 1)
+    throw RecordingError(
+        "ticks " + std::to_string(last_tick_ + 1) + " to " + std::to_string(then.tick - 1) +
+        " are missing in the recording; all ticks before them agree. Record to a faster disk to replay the "
+        "whole run");
+  last_tick_ = then.tick;
+  if (then.change_count > 0)
+    throw RecordingError(
+        "at tick " + std::to_string(then.tick) +
+        " a client changed the scene, the workspace or a limit, and the recording does not contain the "
+        "change; all ticks before it agree. Record a run without changes to replay the whole run");
+}
+
+std::optional<Difference> HandReplay::step() {
+  const TickRecord& then = recording_.ticks[next_++];
+  check_complete(then);
+  clock_.play(then);
+  device_.play(then);
+  proxy_initializer_->play(then);
+  const TimePoint now{Duration(then.now_ns)};
+  // An external release repeats the record of the previous tick with zero wrench and `released` set.
+  if ((then.commands & kReleasedExternally) != 0) {
+    loop_.release(now);
+  } else {
+    loop_.requests().request(then.commands);
+    if (then.external_expires_ns != 0) loop_.requests().set_external_wrench(recorded_request(then));
+    loop_.tick(now, now);
+  }
+  TickRecord replayed;
+  loop_.telemetry().latest_record().read(replayed);
+  return compare(then, replayed);
 }
 
 }  // namespace
@@ -164,47 +247,24 @@ const char* compared_fields() {
 }
 
 std::optional<Difference> replay(const Recording& recording, const RunConfig& config) {
-  if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
-    throw RecordingError(
-        "the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
-        ": a replay needs the state of the loop at its first tick (measured stiffness, motor "
-        "temperature, earlier faults, obstacle poses); replay a recording from the start of a "
-        "run, as wrenchd --record writes it");
-  const auto scene = std::make_shared<const Scene>(config.scene);
-  const auto proxy_initializer = std::make_shared<RecordedProxyInitializer>();
-  RecordedClock clock;
-  RecordedDevice device;
-  ServoLoop loop(config.settings, config.profile, device,
-                 std::make_unique<Rendering>(0, config.settings, config.profile, scene, proxy_initializer),
-                 clock);
-  std::uint64_t last = 0;  // an external release has the number of the previous tick
-  for (const TickRecord& then : recording.ticks) {
-    if (then.tick != last && then.tick != last + 1)
-      throw RecordingError(
-          "ticks " + std::to_string(last + 1) + " to " + std::to_string(then.tick - 1) +
-          " are missing in the recording; all ticks before them agree. Record to a faster disk to replay the "
-          "whole run");
-    last = then.tick;
-    if (then.change_count > 0)
-      throw RecordingError(
-          "at tick " + std::to_string(then.tick) +
-          " a client changed the scene, the workspace or a limit, and the recording does not contain the "
-          "change; all ticks before it agree. Record a run without changes to replay the whole run");
-    clock.play(then);
-    device.play(then);
-    proxy_initializer->play(then);
-    const TimePoint now{Duration(then.now_ns)};
-    // An external release repeats the record of the previous tick with zero wrench and `released` set.
-    if ((then.commands & kReleasedExternally) != 0) {
-      loop.release(now);
-    } else {
-      loop.requests().request(then.commands);
-      if (then.external_expires_ns != 0) loop.requests().set_external_wrench(recorded_request(then));
-      loop.tick(now, now);
+  HandReplay hand(recording, config, {std::make_shared<const Scene>(config.scene), {}});
+  while (!hand.ended())
+    if (auto difference = hand.step()) return difference;
+  return {};
+}
+
+std::optional<Difference> replay_two_hands(const std::array<Recording, 2>& recordings,
+                                           const std::array<RunConfig, 2>& configs) {
+  MeshLoader meshes;
+  const std::array<HandScene, 2> scenes = make_hand_scenes(configs[0], configs[1], meshes);
+  std::array<HandReplay, 2> hands = {HandReplay(recordings[0], configs[0], scenes[0]),
+                                     HandReplay(recordings[1], configs[1], scenes[1])};
+  while (!hands[0].ended() || !hands[1].ended()) {
+    const bool second = hands[0].ended() || (!hands[1].ended() && hands[1].next_ns() < hands[0].next_ns());
+    if (auto difference = hands[second ? 1 : 0].step()) {
+      difference->hand = second ? 1 : 0;
+      return difference;
     }
-    TickRecord replayed;
-    loop.telemetry().latest_record().read(replayed);
-    if (auto difference = compare(then, replayed)) return difference;
   }
   return {};
 }

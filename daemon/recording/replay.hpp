@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,6 +14,7 @@ namespace wrenchd {
 
 /// The first number that differs between a replay and its recording.
 struct Difference {
+  std::size_t hand = 0;  ///< of a run with two hands: 1 for the second one
   std::uint64_t tick = 0;
   std::string field;
   double recorded = 0.0;
@@ -24,6 +27,9 @@ struct Difference {
 /// the recording does not begin at the first tick of the loop, or if ticks are missing. Not RT-safe: takes as
 /// long as the ticks need.
 std::optional<Difference> replay(const Recording& recording, const RunConfig& config);
+/// The same for the recordings of both hands of a run: their ticks alternate as they did.
+std::optional<Difference> replay_two_hands(const std::array<Recording, 2>& recordings,
+                                           const std::array<RunConfig, 2>& configs);
 
 /// Returns the names of the compared columns.
 const char* compared_fields();

@@ -162,7 +162,7 @@ TEST_CASE("a hand whose device is unplugged in virtual time comes back, and the 
                                  !Contains("left: the simulated device was unplugged"));
 }
 
-TEST_CASE("a recording of two hands says so, has the configuration of its hand, and is not replayed",
+TEST_CASE("a recording of two hands says so, has the configuration of its hand, and replays with the other",
           "[two_hands]") {
   const VirtualRun run = run_virtual();
   CHECK(run.first.header.hands == 2);
@@ -181,9 +181,25 @@ TEST_CASE("a recording of two hands says so, has the configuration of its hand, 
   const std::string file = (dir.path() / "run.h5").string();
   run_program("wrenchd", {"--config", write_config(dir).string(), "--virtual-time", "--seconds", "0.1",
                           "--record", file});
-  const ProgramResult replay = run_program("wrenchctl", {"replay", file});
-  CHECK(replay.exit_code != 0);
-  CHECK_THAT(replay.err, Contains("is a recording of a run with two hands"));
+  const std::string left_file = (dir.path() / "run-left.h5").string();
+  for (const std::string& named : {file, left_file}) {
+    const ProgramResult replay = run_program("wrenchctl", {"replay", named});
+    INFO(replay.err);
+    CHECK(replay.exit_code == 0);
+    CHECK_THAT(replay.out, Contains("201 ticks, all bits are equal"));
+  }
+  const auto moved = dir.path() / "alone.h5";
+  std::filesystem::rename(left_file, moved);
+  const ProgramResult lacking = run_program("wrenchctl", {"replay", file});
+  CHECK(lacking.exit_code != 0);
+  CHECK_THAT(lacking.err, Contains("run-left.h5"));
+  const ProgramResult renamed = run_program("wrenchctl", {"replay", moved.string()});
+  CHECK(renamed.exit_code != 0);
+  CHECK_THAT(renamed.err, Contains("its name must end in -left.h5"));
+  const ProgramResult named =
+      run_program("wrenchctl", {"replay", file, "--scene", "scenes/cube_on_table.toml"});
+  CHECK(named.exit_code != 0);
+  CHECK_THAT(named.err, Contains("leave out --config, --scene and --profile"));
 }
 
 TEST_CASE("the live view names the lines of the second hand", "[two_hands]") {

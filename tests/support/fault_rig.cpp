@@ -97,6 +97,10 @@ const TickRecord& FaultRig::tick(Duration after) {
 }
 
 void FaultRig::tick_alone(FaultRig* partner) {
+  if (arms_itself && state() == State::disarmed && clock.now() >= TimePoint{} + from_seconds(kArmAt_s)) {
+    loop.requests().arm();
+    arms_itself = false;
+  }
   const std::size_t held = loop.held_body();
   loop.tick(clock.now(), clock.now());
   if (partner != nullptr) release_other_hand(loop, held, partner->loop);

@@ -128,6 +128,7 @@ class FaultRig {
   void inject(SimulatedFault::Kind kind, double for_s, double value = 0.0);
 
   FaultRig* other = nullptr;  ///< the other hand; its tick() does not tick this one
+  bool arms_itself = false;   ///< arms once as soon as it can: while the other hand is brought to its state
   RigClock own_clock;
   RigClock& clock;
   RunConfig config;

@@ -11,6 +11,7 @@
 
 #include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
+#include "tests/support/two_hands.hpp"
 
 namespace wrenchd::test {
 namespace {
@@ -63,7 +64,32 @@ double script_duration_s(const RunConfig& plan) {
   return plan.settings.simulation.hand_path.back().time_s;
 }
 
+namespace {
+
+/// The ticks of the first of two hands.
+GalleryRun run_two_hands(const std::string& name, double seconds) {
+  TwoHands both(TwoHands::gallery(name));
+  GalleryRun run{both.configs.front(), {}, {}};
+  const double last_s =
+      seconds > 0.0 ? std::min(seconds, script_duration_s(run.config)) : script_duration_s(run.config);
+  TimePoint first{};
+  while (run.scene_time_s.empty() || run.scene_time_s.back() < last_s) {
+    both.step();
+    if (both.hands[0].last.tick < run.ticks.size()) continue;  // a tick of the second hand
+    if (run.ticks.empty()) {
+      first = both.clock.now();
+      both.arm();
+    }
+    run.ticks.push_back(both.hands[0].last);
+    run.scene_time_s.push_back(wrenchd::seconds(both.clock.now() - first));
+  }
+  return run;
+}
+
+}  // namespace
+
 GalleryRun run_gallery_scene(const std::string& name, double seconds) {
+  if (gallery_config(name).two_hands()) return run_two_hands(name, seconds);
   return run_gallery_config(gallery_config(name), seconds);
 }
 

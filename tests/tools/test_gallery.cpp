@@ -176,6 +176,9 @@ TEST_CASE("gallery: a box that is pushed over a table", "[gallery]") {
 TEST_CASE("gallery: a peg that is put into a loose part", "[gallery]") {
   check_scene("place_the_peg");
 }
+TEST_CASE("gallery: a plate that two hands carry", "[gallery]") {
+  check_scene("carry_the_plate");
+}
 TEST_CASE("gallery: a stack that is knocked over", "[gallery]") {
   check_scene("knock_the_stack");
 }
@@ -208,10 +211,10 @@ TEST_CASE("a recording of a scene with generated meshes replays without other fi
 
 TEST_CASE("every gallery scene has a description, a repeating script, a viewpoint and a test", "[gallery]") {
   const std::vector<std::string> all = names();
-  CHECK(all == std::vector<std::string>{"ball_in_bowl", "bolt_and_nut", "dominoes", "gear_pair", "hares",
-                                        "key_in_lock", "knock_the_stack", "moving_obstacle", "nut_on_bolt",
-                                        "paper_cube", "peg_in_hole", "place_the_peg", "push_the_box",
-                                        "ratchet", "staircase", "thin_plate"});
+  CHECK(all == std::vector<std::string>{
+                   "ball_in_bowl", "bolt_and_nut", "carry_the_plate", "dominoes", "gear_pair", "hares",
+                   "key_in_lock", "knock_the_stack", "moving_obstacle", "nut_on_bolt", "paper_cube",
+                   "peg_in_hole", "place_the_peg", "push_the_box", "ratchet", "staircase", "thin_plate"});
   for (const std::string& name : all) {
     INFO(name);
     const RunConfig plan = gallery_config(name);
@@ -239,7 +242,7 @@ TEST_CASE("wrenchctl gallery lists the scenes, and shows one", "[gallery][wrench
   CHECK_THAT(near.err, Catch::Contains("there is no 'stair_case'; did you mean 'staircase'?"));
   const ProgramResult none = run_program("wrenchctl", {"gallery", "teapot"});
   CHECK(none.exit_code == 1);
-  CHECK_THAT(none.err, Catch::Contains("there are ball_in_bowl, bolt_and_nut"));
+  CHECK_THAT(none.err, Catch::Contains("there are ball_in_bowl, bolt_and_nut, carry_the_plate"));
 }
 
 TEST_CASE("tools/run rejects an unknown gallery name with the list of names", "[gallery]") {

@@ -5,6 +5,7 @@ import { file, finished, open, sleep, until, view } from "./browser.mjs";
 export const MOMENTS_s = {
   ball_in_bowl: 4.1,
   bolt_and_nut: 5.4,
+  carry_the_plate: 5.5,
   dominoes: 3.7,
   gear_pair: 4.0,
   hares: 9.9,

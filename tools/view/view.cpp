@@ -13,6 +13,8 @@
 
 #include "collision/meshes/mesh_source.hpp"
 #include "daemon/control/scene_geometry.hpp"
+#include "daemon/hand_scenes.hpp"
+#include "daemon/recording/recorded_inputs.hpp"
 #include "daemon/recording/recorded_run.hpp"
 #include "tools/view/address_file.hpp"
 #include "tools/view/live_feed.hpp"
@@ -51,7 +53,8 @@ void serve(ViewServer& server, const ViewOptions& options) {
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
                     [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
-  const auto scene = std::make_shared<const Scene>(plan.scene, meshes);
+  auto scene = std::make_shared<const Scene>(plan.scene, meshes);
+  if (hands_have_same_tool(recording.header)) scene = with_equal_tool(*scene, plan.settings.rendering);
   const SceneGeometry shapes(scene);
   Json description = shapes.description(*scene);
   const DeviceSettings& device = plan.settings.device;

@@ -1,80 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Two hands whose tools and bodies share one world: the gallery scene carry_the_plate in virtual time.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <memory>
-#include <vector>
 
 #include <catch2/catch.hpp>
 
-#include "daemon/hand_scenes.hpp"
-#include "daemon/servo/two_loops.hpp"
-#include "devices/links/simulated_link.hpp"
-#include "tests/support/exact_intersection.hpp"
-#include "tests/support/shipped_config.hpp"
+#include "tests/support/two_hands.hpp"
 
 namespace wrenchd::test {
 namespace {
 
 constexpr double kPlateWeight_N = 0.25 * 9.81;
 
-/// One of the two hands.
-struct Hand {
-  std::unique_ptr<SimulatedLink> link;
-  std::unique_ptr<Runtime> runtime;
-  TickRecord last;
-
-  Hand(const RunConfig& config, Clock& clock, const MeshLoader& meshes, const HandScene& scene)
-      : link(make_simulated_link(config.profile, config.settings.simulation, clock)),
-        runtime(std::make_unique<Runtime>(config, *link, clock, ProxySearchMode::in_tick, meshes, scene)) {
-    runtime->open();
-    runtime->loop().requests().arm();
-  }
-  ServoLoop& loop() const { return runtime->loop(); }
-  State state() const { return static_cast<State>(last.state); }
-  /// Force on the hand in the world [N]: the base is parallel to it.
-  Vector3d force_N() const { return {last.F_out[0], last.F_out[1], last.F_out[2]}; }
-  Vector3d tool_m() const { return {last.X_WQ[0], last.X_WQ[1], last.X_WQ[2]}; }
-};
-
-struct TwoHands {
-  VirtualClock clock;
-  std::vector<RunConfig> configs;
-  std::array<HandScene, 2> scenes;
-  std::vector<Hand> hands;  ///< right, left
-  TwoLoops loops;
-  int overlaps = 0;
-
-  TwoHands() : configs(gallery()), loops(clock.now(), std::chrono::milliseconds(1)) {
-    MeshLoader meshes;
-    scenes = make_hand_scenes(configs[0], configs[1], meshes);
-    for (std::size_t i = 0; i < 2; ++i) hands.emplace_back(configs[i], clock, meshes, scenes[i]);
-    for (std::size_t i = 0; i < 2; ++i) loops.attach(i, hands[i].loop());
-  }
-  static std::vector<RunConfig> gallery() {
-    std::vector<RunConfig> out =
-        load_run_configs({source_path("config/gallery/carry_the_plate.toml"), {}, {}, false},
-                         SearchPath({source_path("config")}));
-    REQUIRE(out.size() == 2);
-    for (RunConfig& config : out) config.settings.servo.self_test_s = 0.0;
-    return out;
-  }
-  void step() {
-    loops.step(clock);
-    for (Hand& hand : hands) hand.loop().telemetry().latest_record().read(hand.last);
-  }
-  void run_until(double time_s) {
-    while (clock.now() < TimePoint{} + from_seconds(time_s)) step();
-  }
-  Vector3d plate_m() const { return {hands[0].last.X_WB[0], hands[0].last.X_WB[1], hands[0].last.X_WB[2]}; }
-  std::uint8_t held(std::size_t i) const { return static_cast<std::uint8_t>(hands[i].loop().held_body()); }
+/// The right hand and the left one, armed.
+struct PlateRun : TwoHands {
+  PlateRun() : TwoHands(gallery("carry_the_plate")) { arm(); }
 };
 
 }  // namespace
 
 TEST_CASE("two simulated hands carry a plate, and one hands it to the other", "[shared_world]") {
-  TwoHands h;
+  PlateRun h;
   h.run_until(5.5);
   for (std::size_t i = 0; i < 2; ++i) {
     CHECK(h.hands[i].state() == State::active);
@@ -104,13 +50,13 @@ TEST_CASE("two simulated hands carry a plate, and one hands it to the other", "[
   h.run_until(12.2);
   CHECK(h.held(0) == 0);
   CHECK(h.plate_m().z() == Approx(0.006).margin(1e-4));
-  for (const Hand& hand : h.hands) CHECK(hand.state() == State::active);
+  for (const VirtualHand& hand : h.hands) CHECK(hand.state() == State::active);
 }
 
 TEST_CASE("a fault of one hand releases both while they hold the same body, and only one otherwise",
           "[shared_world]") {
   const bool together = GENERATE(true, false);
-  TwoHands h;
+  PlateRun h;
   h.run_until(together ? 5.0 : 1.8);
   REQUIRE(h.held(0) == (together ? 1 : 0));
   h.hands[1].loop().requests().stop();
@@ -130,7 +76,7 @@ TEST_CASE("a fault of one hand releases both while they hold the same body, and 
 }
 
 TEST_CASE("a hand whose device is lost leaves the world, and the other one goes on", "[shared_world]") {
-  TwoHands h;
+  PlateRun h;
   h.run_until(1.8);
   h.hands[1].link->device().inject(
       {SimulatedFault::Kind::unplug, h.clock.now() - TimePoint{}, std::chrono::milliseconds(100)});
@@ -144,7 +90,7 @@ TEST_CASE("a hand whose device is lost leaves the world, and the other one goes 
 }
 
 TEST_CASE("two hands are deterministic", "[shared_world]") {
-  TwoHands a, b;
+  PlateRun a, b;
   a.run_until(3.5);
   b.run_until(3.5);
   for (std::size_t i = 0; i < 2; ++i) {

@@ -98,14 +98,15 @@ class Client:
         answer = None
         while True:
             status = self.status()
+            reason = status.get("no_force") or status["state"]
             if answer is None and status["state"] != "releasing":
                 answer = self.call("arm")
             elif answer is not None and status["state"] == "active":
                 return answer
             elif answer is not None and status["state"] in ("fault", "stopped"):
-                raise Rejected(Rejected.INVALID_STATE, f"the loop did not become active: {status['no_force']}")
+                raise Rejected(Rejected.INVALID_STATE, f"the loop did not become active: {reason}")
             if time.monotonic() > ends_s:
-                raise Timeout(f"the loop is not active after {within_s} s: {status['no_force']}")
+                raise Timeout(f"the loop is not active after {within_s} s: {reason}")
             time.sleep(0.01)
 
     def disarm(self):
