@@ -70,12 +70,16 @@ namespace {
 GalleryRun run_two_hands(const std::string& name, double seconds) {
   TwoHands both(TwoHands::gallery(name));
   GalleryRun run{both.configs.front(), {}, {}};
+  run.second_config = both.configs.back();
   const double last_s =
       seconds > 0.0 ? std::min(seconds, script_duration_s(run.config)) : script_duration_s(run.config);
   TimePoint first{};
   while (run.scene_time_s.empty() || run.scene_time_s.back() < last_s) {
     both.step();
-    if (both.hands[0].last.tick < run.ticks.size()) continue;  // a tick of the second hand
+    if (both.hands[1].last.now_ns > both.hands[0].last.now_ns) {
+      run.second_ticks.push_back(both.hands[1].last);
+      continue;
+    }
     if (run.ticks.empty()) {
       first = both.clock.now();
       both.arm();

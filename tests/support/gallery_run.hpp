@@ -14,6 +14,8 @@ struct GalleryRun {
   RunConfig config;
   std::vector<TickRecord> ticks;
   std::vector<double> scene_time_s;  ///< scene time of each tick
+  RunConfig second_config = {};  ///< of the second hand of a scene for two hands, whose ticks these are not
+  std::vector<TickRecord> second_ticks = {};
 };
 
 /// Returns the configuration of a gallery scene as shipped, without the self-test.

@@ -126,9 +126,12 @@ void check_scene(const std::string& name) {
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 
-  Recording recording;
+  Recording recording, second;
   recording.ticks = run.ticks;
-  const auto difference = replay(recording, run.config);
+  second.ticks = run.second_ticks;
+  const auto difference = run.config.two_hands()
+                              ? replay_two_hands({recording, second}, {run.config, run.second_config})
+                              : replay(recording, run.config);
   if (difference) FAIL("replay: tick " << difference->tick << ' ' << difference->field);
 
   if (kSeconds > 0.0) return;
