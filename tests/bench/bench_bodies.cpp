@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include "collision/bodies/body_world.hpp"
 #include "collision/meshes/make_mesh.hpp"
@@ -301,9 +303,21 @@ std::string against_closed_form(const BoxScene& scene, const Figures& figures) {
   return "-";
 }
 
+/// Starts the program again with one thread for linear algebra, unless it is so already. Every simulator has
+/// one thread; the libraries below Siconos read the number of theirs when they are loaded, and threads that
+/// wait for each other on a busy machine are no measure of it.
+void use_one_thread(char** argv) {
+  const char* const kOpenBlas = "OPENBLAS_NUM_THREADS";
+  if (std::getenv(kOpenBlas) != nullptr) return;
+  setenv(kOpenBlas, "1", 1);
+  setenv("OMP_NUM_THREADS", "1", 1);
+  execv("/proc/self/exe", argv);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  use_one_thread(argv);
   CLI::App app("bench_bodies: boxes on a plane, beside other simulators.");
   double seconds = 10.0;
   bool quick = false;

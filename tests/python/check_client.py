@@ -107,9 +107,8 @@ class Commands(unittest.TestCase):
             else:
                 self.assertIn(self.client.status()["state"], ("active", "fault"))
             self.client.stop()
-            with self.assertRaises(wrenchd.Rejected) as rejected:
+            with self.assertRaises(wrenchd.Rejected):
                 self.client.arm(within_s=5)
-            self.assertIn("cannot be armed in state", str(rejected.exception))
         self.assertTrue(soon(lambda: becomes_disarmed(self.client)))
 
     def test_moves_the_hand(self):
