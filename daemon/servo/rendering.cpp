@@ -23,22 +23,25 @@ constexpr Duration kRetryDelay = std::chrono::milliseconds(100);
 constexpr auto kWarmUpLimit = std::chrono::milliseconds(50);
 constexpr int kWarmUpTicks = 30;
 
-/// The bodies feel the spring of the energy law, whose wrench is the gradient of what the projection
-/// minimizes.
-void require_support_for_bodies(const Scene& scene, const Settings& settings) {
-  if (scene.bodies().empty()) return;
+/// Returns the scene. Throws std::invalid_argument if it has bodies and the settings do not support them:
+/// bodies feel the spring of the energy law, whose wrench is the gradient of what the projection minimizes.
+std::shared_ptr<const Scene> with_support_for_bodies(std::shared_ptr<const Scene> given,
+                                                     const Settings& settings) {
+  const Scene& scene = *given;
+  if (scene.bodies().empty()) return given;
   const bool two_hands = scene.bodies().back().of_hand;
   const std::string what = two_hands ? "two hands act in the scene" : "the scene has free bodies";
   const std::string cure = two_hands ? "remove the [[hand]] table" : "remove the [[body]] tables";
   if (settings.rendering.method != Method::exact)
-    throw std::invalid_argument(what + ", and only [rendering] method \"exact\" moves them; choose it, or " +
-                                cure);
+    throw std::invalid_argument(
+        what + ", and only [rendering] method \"exact\" supports that; choose it, or " + cure);
   if (settings.wrench.law != SpringLaw::energy)
-    throw std::invalid_argument(what + ", and only [wrench] law \"energy\" moves them; choose it, or " +
+    throw std::invalid_argument(what + ", and only [wrench] law \"energy\" supports that; choose it, or " +
                                 cure);
   if (settings.rendering.contacts == ContactBackend::cgal)
     throw std::invalid_argument(
-        what + ", and only [rendering] contacts \"native\" moves them; choose it, or " + cure);
+        what + ", and only [rendering] contacts \"native\" supports that; choose it, or " + cure);
+  return given;
 }
 
 /// FNV-1a over 64-bit words.
@@ -77,7 +80,7 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
                      std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer,
                      const SharedTool& shared)
     : id_(id),
-      scene_(std::move(scene)),
+      scene_(with_support_for_bodies(std::move(scene), settings)),
       proxy_initializer_(std::move(proxy_initializer)),
       X_HT_(settings.device.tool_in_handle.pose() * scene_->tool().X_MT()),
       M_(scene_->tool().solid.inertia),
@@ -88,7 +91,6 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       penetration_(*scene_, proxy_options(*scene_, settings)),
       shares_world_(shared.world != nullptr),
       law_(gains_) {
-  require_support_for_bodies(*scene_, settings);
   if (shares_world_)
     bodies_.emplace(shared.world, shared.tool, *scene_);
   else if (!scene_->bodies().empty())
