@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording/replay.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -163,7 +165,9 @@ class HandReplay {
  public:
   /// The recording and the configuration must outlive this object. Throws RecordingError if the recording
   /// does not begin at the first tick.
-  HandReplay(const Recording& recording, const RunConfig& config, const HandScene& hand)
+  /// scene_start: of two hands.
+  HandReplay(const Recording& recording, const RunConfig& config, const HandScene& hand,
+             std::optional<TimePoint> scene_start = {})
       : recording_(recording),
         proxy_initializer_(std::make_shared<RecordedProxyInitializer>()),
         loop_(config.settings, config.profile, device_,
@@ -176,6 +180,7 @@ class HandReplay {
           ": a replay needs the state of the loop at its first tick (measured stiffness, motor "
           "temperature, earlier faults, obstacle poses); replay a recording from the start of a "
           "run, as wrenchd --record writes it");
+    if (scene_start) loop_.start_scene_at(*scene_start);
   }
 
   bool ended() const noexcept { return next_ == recording_.ticks.size(); }
@@ -257,8 +262,12 @@ std::optional<Difference> replay_two_hands(const std::array<Recording, 2>& recor
                                            const std::array<RunConfig, 2>& configs) {
   MeshLoader meshes;
   const std::array<HandScene, 2> scenes = make_hand_scenes(configs[0], configs[1], meshes);
-  std::array<HandReplay, 2> hands = {HandReplay(recordings[0], configs[0], scenes[0]),
-                                     HandReplay(recordings[1], configs[1], scenes[1])};
+  std::int64_t first_ns = INT64_MAX;
+  for (const Recording& recording : recordings)
+    if (!recording.ticks.empty()) first_ns = std::min(first_ns, recording.ticks.front().now_ns);
+  const TimePoint start{Duration(first_ns)};
+  std::array<HandReplay, 2> hands = {HandReplay(recordings[0], configs[0], scenes[0], start),
+                                     HandReplay(recordings[1], configs[1], scenes[1], start)};
   while (!hands[0].ended() || !hands[1].ended()) {
     const bool second = hands[0].ended() || (!hands[1].ended() && hands[1].next_ns() < hands[0].next_ns());
     if (auto difference = hands[second ? 1 : 0].step()) {

@@ -41,6 +41,10 @@ class ServoLoop {
   /// RT-safe.
   Fault tick(TimePoint now, TimePoint due) noexcept;
 
+  /// Before the first tick: scene time is that since `start`, instead of that since the first tick. Two hands
+  /// have the same scene time. RT-safe.
+  void start_scene_at(TimePoint start) noexcept { clock_.start_scene_at(start); }
+
   /// Releases the hand at once, whatever the state: zero wrench, motors off. Harmless when called again.
   /// Between two ticks only. RT-safe.
   void release(TimePoint now) noexcept;

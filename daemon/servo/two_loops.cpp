@@ -65,6 +65,8 @@ void TwoLoops::tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept {
     if (loop.telemetry().state() == State::shutdown) return ended(Fault::none);
     loop.requests().request(kQuit);
   }
+  if (!scene_start_) scene_start_ = now;
+  loop.start_scene_at(*scene_start_);
   const std::size_t held = loop.held_body();
   const Fault fault = loop.tick(now, hand.due);
   Hand& other = &hand == &hands_[0] ? hands_[1] : hands_[0];

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <optional>
 
 #include "core/clock.hpp"
 #include "core/fault.hpp"
@@ -57,6 +58,7 @@ class TwoLoops {
   void tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept;
 
   Duration period_;
+  std::optional<TimePoint> scene_start_;  ///< the first tick of either hand
   std::array<Hand, kHands> hands_;
 };
 

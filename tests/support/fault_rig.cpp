@@ -65,7 +65,9 @@ FaultRig::FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust)
     : FaultRig(plan(phase, adjust), HandScene{}, nullptr) {}
 
 FaultRig::FaultRig(RunConfig plan, const HandScene& hand, RigClock& shared_clock)
-    : FaultRig(std::move(plan), hand, &shared_clock) {}
+    : FaultRig(std::move(plan), hand, &shared_clock) {
+  loop.start_scene_at(TimePoint{});
+}
 
 FaultRig::FaultRig(RunConfig plan, const HandScene& hand, RigClock* shared_clock)
     : clock(shared_clock != nullptr ? *shared_clock : own_clock),

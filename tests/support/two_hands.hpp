@@ -42,12 +42,13 @@ struct TwoHands {
   std::vector<VirtualHand> hands;
   TwoLoops loops;
 
-  explicit TwoHands(std::vector<RunConfig> both)
+  /// second_is_there: false if the device of the second hand comes later, by loops.attach().
+  explicit TwoHands(std::vector<RunConfig> both, bool second_is_there = true)
       : configs(std::move(both)), loops(clock.now(), std::chrono::milliseconds(1)) {
     MeshLoader meshes;
     scenes = make_hand_scenes(configs[0], configs[1], meshes);
     for (std::size_t i = 0; i < 2; ++i) hands.emplace_back(configs[i], clock, meshes, scenes[i]);
-    for (std::size_t i = 0; i < 2; ++i) loops.attach(i, hands[i].loop());
+    for (std::size_t i = 0; i < (second_is_there ? 2U : 1U); ++i) loops.attach(i, hands[i].loop());
   }
   /// Both configurations of a scene of the gallery.
   static std::vector<RunConfig> gallery(const std::string& name) {

@@ -2,6 +2,7 @@
 // Two hands whose tools and bodies share one world: the gallery scene carry_the_plate in virtual time.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -87,6 +88,21 @@ TEST_CASE("a hand whose device is lost leaves the world, and the other one goes 
   CHECK(h.hands[0].last.X_WB[9] == -SharedWorld::kFarBelow_m);
   h.run_until(3.0);
   CHECK(h.held(0) == 1);  // it takes the plate alone
+}
+
+TEST_CASE("a body falls by the clock, also if the second hand comes later", "[shared_world]") {
+  const bool later = GENERATE(false, true);
+  std::vector<RunConfig> configs = TwoHands::gallery("carry_the_plate");
+  for (RunConfig& config : configs) config.scene.bodies[0].X_WM.translation_m.z() = 0.6;
+  TwoHands h(configs, !later);
+  const BodyWorld& world = h.scenes[0].tool.world->world();
+  h.run_until(0.1);
+  if (later) h.loops.attach(1, h.hands[1].loop());
+  h.run_until(0.25);
+  // The first step takes a millisecond, the first tick is after one.
+  CHECK(0.6 - world.motion(1).X_WB.translation_m.z() == Approx(0.5 * 9.81 * 0.25 * 0.25).epsilon(0.01));
+  CHECK(world.motion(1).velocity_W_m_per_s.z() == Approx(-9.81 * 0.25).epsilon(0.005));
+  CHECK(world.time_s() == Approx(0.249).margin(1e-3));
 }
 
 TEST_CASE("two hands are deterministic", "[shared_world]") {
