@@ -44,9 +44,8 @@ std::optional<SecondHand> read_second_hand(TomlTable& root, const SettingContext
   if (hands.empty()) return {};
   if (hands.size() > 1)
     hands[1].reject(
-        "is a third hand, and one process has two: those of the file and of one [[hand]]; remove it, or "
-        "start "
-        "another wrenchd with a file of its own");
+        "is a third hand, and one process has two: that of the file and that of one [[hand]]; remove it, or "
+        "start another wrenchd with a file of its own");
   SecondHand hand{.name = {}, .settings = first, .tool = {}, .location = hands[0].location()};
   hand.settings.device.serial.clear();
   hand.settings.device.usb_port.clear();

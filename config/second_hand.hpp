@@ -15,10 +15,10 @@ namespace wrenchd {
 /// hand.
 struct SecondHand {
   std::string name;                  ///< part of the names of its files, "left" in "control-left.sock"
-  Settings settings;                 ///< of the first hand, with what [[hand]] states in their place
+  Settings settings;                 ///< those of the first hand; what [[hand]] states replaces them
   std::optional<ToolSettings> tool;  ///< empty: the tool of the scene
   bool names_profile = false;        ///< [[hand]] states the profile of the device
-  SourceLocation location;           ///< of [[hand]], for messages
+  SourceLocation location;           ///< place of [[hand]], for messages
 };
 
 /// Reads [[hand]] of a root table; returns nothing if there is none. Serial number and USB port name one

@@ -413,6 +413,13 @@ void read_settings(TomlTable& root, const SettingContext& context, Settings& set
   read_section(root, section_named(""), context, Absent::look_up, settings);
 }
 
+std::vector<std::string_view> sections_of_hand() {
+  std::vector<std::string_view> names;
+  for (const Section& section : kSections)
+    if (section.of_hand) names.push_back(section.name);
+  return names;
+}
+
 void read_hand_settings(TomlTable& hand, const SettingContext& context, Settings& settings) {
   for (const Section& section : kSections) {
     if (section.name.empty() || section.name.find('.') != std::string_view::npos) continue;

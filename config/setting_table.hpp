@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "config/search_path.hpp"
 #include "config/settings.hpp"
@@ -54,8 +55,11 @@ std::span<const Setting> setting_table() noexcept;
 /// other.
 void read_settings(TomlTable& root, const SettingContext& context, Settings& settings);
 
-/// Reads the sections that each hand has for itself, [device], [limits] and [simulation], over the values
-/// that `settings` has. Rejects the sections that apply to both hands. hand: a [[hand]] table.
+/// The names of the sections that each hand has for itself. Not RT-safe: allocates.
+std::vector<std::string_view> sections_of_hand();
+
+/// Reads the sections_of_hand() over the values that `settings` has. Rejects the sections that apply to both
+/// hands. hand: a [[hand]] table.
 void read_hand_settings(TomlTable& hand, const SettingContext& context, Settings& settings);
 
 /// Reads [rendering] and [wrench] only.

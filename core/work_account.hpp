@@ -14,7 +14,7 @@ namespace wrenchd {
 /// Properties of the servo loop that a WorkAccount needs.
 struct WorkAccountLoop {
   std::size_t delay_ticks = 4;  ///< number of ticks for which a wrench may still act after it was sent
-  EncoderStep step = {};        ///< of the device; 0: not stated
+  EncoderStep step = {};        ///< step of the device's encoders; 0: the profile states none
 };
 
 /// Bounds the work that an external wrench does on the hand: by the energy that its source has declared, and

@@ -122,7 +122,7 @@ LiveView::Print live_print(const Options& options, OutputQueue& queue) {
 
 /// The device of a hand and the link to it.
 struct HandDevice {
-  LoopbackScript script = {};  ///< of a simulated device
+  LoopbackScript script = {};  ///< faults and commands for a simulated device
   std::unique_ptr<ReportLink> link = {};
   DeviceInHand* simulated = nullptr;          ///< null: a real device, or one in another process
   const ReconnectingLink* plugged = nullptr;  ///< null: a simulated device
@@ -166,7 +166,7 @@ MeshLoader mesh_loader() {
 
 /// One hand: its device, and everything that is built from its configuration.
 struct Hand {
-  /// scene: of one of two hands, whose meshes `meshes` has read.
+  /// scene: only for one of two hands; `meshes` has read its meshes.
   Hand(RunConfig config, const RunContext& run_context, Clock& clock,
        const MeshLoader& meshes = mesh_loader(), const HandScene& scene = {})
       : context(run_context),

@@ -68,7 +68,7 @@ class Runtime {
   const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
   /// Opens the device, after closing it if it is open. Call it before the loop runs and after each loss of
   /// the device. The loop is disarmed afterwards. Throws as the link does. Precondition: no servo thread
-  /// runs.
+  /// ticks this loop.
   void open() { device_.open(); }
   void close() noexcept { device_.close(); }
   /// The device, for homing. Precondition: no servo thread runs.

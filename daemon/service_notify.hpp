@@ -110,7 +110,7 @@ class ServiceNotify {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   ServiceReport report_;
-  std::array<ReadLoopStatus, 2> read_loop_status_;  ///< of each hand
+  std::array<ReadLoopStatus, 2> read_loop_status_;  ///< null: no loop of this hand runs
   std::jthread thread_;                             ///< last member: it uses the members above
 };
 

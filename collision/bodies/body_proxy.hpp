@@ -25,6 +25,8 @@ class BodyProxy {
 
   /// Moves the bodies to scene time time_s [s] while no proxy follows the hand: the tool is out of the world.
   void move_without_tool(double time_s) noexcept;
+  /// True if another hand leads a tool in the same world.
+  bool shares_world() const noexcept { return world_.tool_count() > 1; }
   /// Takes the tool out of the world until enter(). It lets go.
   void leave() noexcept { world_.remove_tool(tool_); }
   /// Puts the tool at X_WQ, which was admissible with the bodies at `then` and the obstacles at then_s.

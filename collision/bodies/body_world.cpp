@@ -230,7 +230,8 @@ void BodyWorld::remove_tool(std::size_t tool) noexcept {
   out.load_W = {};
 }
 
-/// Sets the goals of all bodies and moves the contacts with the obstacles that move. hand: of this tool.
+/// Sets the goals of all bodies and moves the contacts with the obstacles that move. hand: what the hand of
+/// this tool asks for.
 void BodyWorld::begin(const std::optional<Hand>& hand, std::size_t tool) noexcept {
   save();
   tool_was_moved_ = false;
@@ -874,8 +875,8 @@ void BodyWorld::hold_all() noexcept {
 
 /// Applies the impulses of all contacts to the motions without contact, METHOD (109), and adds up the work on
 /// the tools, METHOD (111).
-void BodyWorld::apply_impulses(std::size_t named_tool) noexcept {
-  for (std::size_t tool = 0; tool < tools_.size(); ++tool) begin_work(tools_[tool], tool == named_tool);
+void BodyWorld::apply_impulses(std::size_t tool_of_step) noexcept {
+  for (std::size_t tool = 0; tool < tools_.size(); ++tool) begin_work(tools_[tool], tool == tool_of_step);
   for (BodyContact& c : contacts_) {
     if (bodies_[c.a].asleep) continue;
     const ContactGeometry at = acting_geometry(c);
@@ -906,10 +907,11 @@ void BodyWorld::apply_impulses(std::size_t named_tool) noexcept {
   }
 }
 
-/// work_J adds up over the steps that do not name the tool. The step that names it completes the sum.
-void BodyWorld::begin_work(Tool& tool, bool named) noexcept {
+/// The work on a tool adds up over the steps of the other hand, and the next step of its own hand completes
+/// the sum. is_of_step: the step is one of the tool's own hand.
+void BodyWorld::begin_work(Tool& tool, bool is_of_step) noexcept {
   if (tool.work_complete) tool.work_J = 0.0;
-  tool.work_complete = named;
+  tool.work_complete = is_of_step;
 }
 
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.

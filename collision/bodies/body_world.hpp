@@ -70,8 +70,8 @@ class BodyWorld {
   void place(std::size_t body, const BodyMotion& motion) noexcept;
 
   /// Moves all bodies for dt_s [s], and the obstacles that move to their poses at scene time until_s [s].
-  /// hand: of this tool; without a hand the tool takes no part. The hand of another tool stays as it was in
-  /// the last step that named it. RT-safe.
+  /// hand: what the hand of this tool asks for; without it the tool is out of the world. The other hand asks
+  /// for the same as in the last step of its tool. RT-safe.
   Status step(const std::optional<Hand>& hand, double dt_s, double until_s, std::size_t tool = 0) noexcept;
   Status step(const std::optional<Hand>& hand, double dt_s) noexcept {
     return step(hand, dt_s, time_s_ + dt_s);
@@ -79,7 +79,7 @@ class BodyWorld {
   /// Puts a tool into the world at a pose that admits_tool(). The steps of another hand then find it there.
   /// RT-safe.
   void enter_tool(std::size_t tool, const Pose& X_WT) noexcept;
-  /// Takes a tool out of the world until it enters, or a step names its hand. It lets go. RT-safe.
+  /// Takes a tool out of the world until it enters, or until the next step of its hand. It lets go. RT-safe.
   void remove_tool(std::size_t tool) noexcept;
   /// Joins the tool to the body that it presses on most. Returns false if it touches no body, or holds one.
   /// Two tools may hold one body. RT-safe.
@@ -103,8 +103,8 @@ class BodyWorld {
   bool tool_was_moved() const noexcept { return tool_was_moved_; }
 
   /// True if the tool may enter at X_WT. It was admissible there with the bodies at X_WB_then and the
-  /// obstacles at then_s; nothing has moved into it since. X_WB_then: of all other bodies, by their numbers.
-  /// RT-safe.
+  /// obstacles at then_s; nothing has moved into it since. X_WB_then: one pose for each other body, at its
+  /// place_among_others(). RT-safe.
   bool admits_tool(const Pose& X_WT, std::span<const Pose> X_WB_then, double then_s,
                    std::size_t tool = 0) noexcept;
 
@@ -112,7 +112,7 @@ class BodyWorld {
   std::size_t tool_count() const noexcept { return tools_.size(); }
   /// The number of the body that is a tool.
   std::size_t body_of(std::size_t tool) const noexcept { return tools_[tool].body; }
-  /// True if a tool takes part in steps.
+  /// True if a tool is in the world.
   bool has_hand(std::size_t tool) const noexcept { return tools_[tool].hand.has_value(); }
   /// The place of a body in a list of all bodies but one tool: the free bodies first, then the other tool.
   std::size_t place_among_others(std::size_t body) const noexcept {
@@ -140,7 +140,7 @@ class BodyWorld {
   /// Largest displacement of a point by the last Newton step [m]; 1e-12 or less if it converged.
   double last_change_m() const noexcept { return last_change_m_; }
   /// Work of bodies, of the other tool and of moving obstacles on the tool [J], METHOD (111): in the last
-  /// step that named it, and in the steps of the other tool before.
+  /// step of this tool's hand and in the steps of the other hand before it.
   double work_on_tool_J(std::size_t tool = 0) const noexcept { return tools_[tool].work_J; }
   /// The tool and the obstacles or the body of a contact, as the features of contact.contact number them.
   const Scene& scene_of(const BodyContact& contact) const noexcept { return pair_of(contact).scene(); }
@@ -182,15 +182,15 @@ class BodyWorld {
   /// A tool that a hand leads. A step changes it.
   struct Tool {
     std::size_t body = 0;            ///< number of its body
-    std::optional<Hand> hand;        ///< of the last step that named the tool; empty: takes no part
+    std::optional<Hand> hand;        ///< what its hand asked for last; empty: the tool is out of the world
     std::optional<Grasp> grasp;      ///< empty: holds nothing
-    std::optional<ToolReturn> back;  ///< way back to the hand after a grasp; empty: is there
+    std::optional<ToolReturn> back;  ///< way back to the hand after a grasp; empty: the tool is there
     /// Loads on the tool about its centre of mass, in axes of W: of the held body and of the return; of the
     /// held body alone.
     Wrench load_W, grasp_load_W;
     double work_J = 0.0;        ///< work on the tool: work_on_tool_J()
-    bool work_complete = true;  ///< the last step named the tool: the next one begins a new sum
-    bool grasp_broke = false;
+    bool work_complete = true;  ///< the last step completed work_J; the next step begins a new sum
+    bool grasp_broke = false;   ///< grasp_broke()
   };
 
   enum class Friction : std::uint8_t { coulomb, frozen, none };
@@ -228,7 +228,7 @@ class BodyWorld {
   Pose tool_goal(const Tool& tool) const noexcept;
   void push_held() noexcept;
   void finish_grasps() noexcept;
-  static void begin_work(Tool& tool, bool named) noexcept;
+  static void begin_work(Tool& tool, bool is_of_step) noexcept;
   void advance_returns() noexcept;
   bool root_with_curvature(std::size_t mover, const Matrix6d& metric) noexcept;
   Vector6d gap_gradient(std::size_t mover, const BodyContact& contact, const Vector6d& step) const noexcept;
@@ -255,7 +255,7 @@ class BodyWorld {
   void shorten(const BodyPair& pair) noexcept;
   void hold(Body& body) noexcept;
   void hold_all() noexcept;
-  void apply_impulses(std::size_t named_tool) noexcept;
+  void apply_impulses(std::size_t tool_of_step) noexcept;
   void prefetch() noexcept;
   BodyPath path_of(std::size_t body) const noexcept;
 

@@ -14,8 +14,8 @@ namespace wrenchd {
 /// Poses of the bodies of a scene, in their order; the tool of a second hand is the last one.
 using BodyPoses = StaticVector<Pose, SceneSettings::kMaxBodies>;
 
-/// A BodyWorld and the time up to which its bodies have moved. The proxies of all hands in it share one
-/// object. Each moves the world on to its own tick, for the time since the last step of any of them. Time is
+/// A BodyWorld that knows the time up to which its bodies have moved. The proxies of all hands in it share
+/// one object. Each tick of a hand moves the world on, for the time since the last tick of any hand. Time is
 /// scene time.
 ///
 /// The constructor allocates all memory; all other members are RT-safe. One thread uses an object.

@@ -138,13 +138,13 @@ Reconfigurator::BuiltScene Reconfigurator::build_starting_scene(SceneSettings& s
   return built;
 }
 
-/// Both hands render one scene, and nothing exchanges the renderings of two loops in the same tick.
+/// Throws std::invalid_argument if there are two hands: both render one scene, and no mechanism exchanges the
+/// renderings of two loops in the same tick.
 void Reconfigurator::reject_with_two_hands() const {
   if (config_.two_hands())
     throw std::invalid_argument(
         "two hands share the scene and its rendering, which do not change while they run; change the file "
-        "and "
-        "start wrenchd again");
+        "and start wrenchd again");
 }
 
 /// The bodies of a scene that is built again start at rest where they are now.

@@ -11,6 +11,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/setting_table.hpp"
 #include "core/files/opened_file.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
@@ -117,23 +118,29 @@ void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& 
     mesh->node.value = mesh_at(header, role, directory).string();
 }
 
+/// Returns the table [[hand]] of settings; null if there is none.
+TomlNode* second_hand_of(TomlNode& settings) {
+  TomlEntry* const found = find(settings, "hand");
+  auto* const list = found == nullptr ? nullptr : std::get_if<TomlNode::Array>(&found->node.value);
+  return list == nullptr || list->empty() ? nullptr : &list->front();
+}
+
 /// Removes [[hand]], and returns its name; empty if there is none. If the ticks are those of the second hand,
 /// its sections take the place of those of the first one. The scene and the profile of the recording are
 /// those of this hand already.
 std::string choose_hand(TomlNode& tree, const RecordingHeader& header) {
-  auto* const entries = std::get_if<TomlNode::Table>(&tree.value);
-  TomlEntry* const found = find(tree, "hand");
-  if (entries == nullptr || found == nullptr) return {};
-  TomlNode hands = std::move(found->node);
-  std::erase_if(*entries, [](const TomlEntry& entry) { return entry.key == "hand"; });
-  auto* const list = std::get_if<TomlNode::Array>(&hands.value);
-  if (list == nullptr || list->empty()) return {};
-  TomlEntry* const name = find(list->front(), "name");
+  TomlNode* const found = second_hand_of(tree);
+  if (found == nullptr) return {};
+  TomlNode hand = std::move(*found);
+  std::erase_if(std::get<TomlNode::Table>(tree.value),
+                [](const TomlEntry& entry) { return entry.key == "hand"; });
+  TomlEntry* const name = find(hand, "name");
   const auto* const text = name == nullptr ? nullptr : std::get_if<std::string>(&name->node.value);
   if (text == nullptr) return {};
   if (header.hand.empty()) return *text;
-  for (const char* const section : {"device", "limits", "simulation"}) {
-    TomlEntry* const own = find(list->front(), section);
+  for (const std::string_view name_of_section : sections_of_hand()) {
+    const std::string section(name_of_section);
+    TomlEntry* const own = find(hand, section);
     auto* const values = own == nullptr ? nullptr : std::get_if<TomlNode::Table>(&own->node.value);
     auto* const common = std::get_if<TomlNode::Table>(&table_in(tree, section)->value);
     if (values == nullptr || common == nullptr) continue;
@@ -262,9 +269,8 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
 bool hands_have_same_tool(const RecordingHeader& header) {
   if (header.hands != 2) return false;
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
-  TomlEntry* const hand = find(tree, "hand");
-  auto* const list = hand == nullptr ? nullptr : std::get_if<TomlNode::Array>(&hand->node.value);
-  return list != nullptr && !list->empty() && find(list->front(), "tool") == nullptr;
+  TomlNode* const hand = second_hand_of(tree);
+  return hand != nullptr && find(*hand, "tool") == nullptr;
 }
 
 }  // namespace wrenchd

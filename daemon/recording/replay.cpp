@@ -164,8 +164,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
 class HandReplay {
  public:
   /// The recording and the configuration must outlive this object. Throws RecordingError if the recording
-  /// does not begin at the first tick.
-  /// scene_start: of two hands.
+  /// does not begin at the first tick. scene_start: first tick of either of two hands.
   HandReplay(const Recording& recording, const RunConfig& config, const HandScene& hand,
              std::optional<TimePoint> scene_start = {})
       : recording_(recording),

@@ -14,7 +14,7 @@ namespace wrenchd {
 
 /// The first number that differs between a replay and its recording.
 struct Difference {
-  std::size_t hand = 0;  ///< of a run with two hands: 1 for the second one
+  std::size_t hand = 0;  ///< 1: the second hand of a run with two hands
   std::uint64_t tick = 0;
   std::string field;
   double recorded = 0.0;

@@ -89,9 +89,8 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
       penetration_(*scene_, proxy_options(*scene_, settings)),
-      shares_world_(shared.world != nullptr),
       law_(gains_) {
-  if (shares_world_)
+  if (shared.world)
     bodies_.emplace(shared.world, shared.tool, *scene_);
   else if (!scene_->bodies().empty())
     bodies_.emplace(*scene_, settings.rendering.friction.dynamic_coefficient, settings.rendering.grasp);

@@ -54,7 +54,7 @@ class Rendering {
   void invalidate_proxy() noexcept;
   /// In a world of two hands: the hand is gone, and its tool is in nobody's way. RT-safe.
   void leave_shared_world() noexcept {
-    if (shares_world_) invalidate_proxy();
+    if (bodies_ && bodies_->shares_world()) invalidate_proxy();
   }
   /// Resets integral and derivative of the wrench law, for use after a gap of unknown length. RT-safe.
   void reset_law() noexcept { law_.reset(); }
@@ -129,7 +129,6 @@ class Rendering {
   PenetrationDepth penetration_;
   /// Follows the hand in a scene with bodies, unless they sleep out of reach; penetration_ does otherwise.
   std::optional<BodyProxy> bodies_;
-  bool shares_world_;
   WrenchLaw law_;
   LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;  ///< Factor on the configured stiffness.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/servo/servo_loop.hpp"
 
+#include "daemon/servo/due_time.hpp"
+
 // What wrenchd does, a thousand times a second or more (Algorithm 1 of the paper):
 //
 //   device -> pose p -> contacts -> projection q -> wrench -> limits -> device
@@ -113,19 +115,15 @@ void ServoLoop::forget_device() noexcept {
 }
 
 /// Sleeps until the next tick is due, by the clock or by the device's next report. If the loop fell behind,
-/// it skips the missed ticks: two ticks in a row on the same sample would compute the same wrench twice.
+/// it skips the missed ticks.
 TimePoint ServoLoop::wait_for_next(Clock& clock, TimePoint due) noexcept {
   if (pacing_ == Pacing::device) {
     port_.wait_readable(clock.now() + kDeviceTimeout_periods * period_);
     return clock.now();
   }
   TimePoint next = due + period_;
-  const TimePoint now = clock.now();
-  if (now > next) {
-    const auto missed = (now - next) / period_ + 1;
-    telemetry_.count_overrun(static_cast<std::uint64_t>(missed));
-    next += missed * period_;
-  }
+  if (const std::uint64_t missed = skip_missed_ticks(next, period_, clock.now()); missed > 0)
+    telemetry_.count_overrun(missed);
   clock.sleep_until(next);
   return next;
 }

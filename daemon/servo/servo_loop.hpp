@@ -41,8 +41,8 @@ class ServoLoop {
   /// RT-safe.
   Fault tick(TimePoint now, TimePoint due) noexcept;
 
-  /// Before the first tick: scene time is that since `start`, instead of that since the first tick. Two hands
-  /// have the same scene time. RT-safe.
+  /// Scene time begins at `start` instead of at the first tick, so that two hands have the same scene time.
+  /// Without effect after the first tick. RT-safe.
   void start_scene_at(TimePoint start) noexcept { clock_.start_scene_at(start); }
 
   /// Releases the hand at once, whatever the state: zero wrench, motors off. Harmless when called again.

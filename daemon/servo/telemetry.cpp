@@ -131,7 +131,8 @@ void Telemetry::publish(const TickResult& tick, const Supervisor& supervisor,
                         const Rendering& rendering) noexcept {
   record_ = make_record(tick, supervisor);
   totals_.add(record_);
-  emit_changes(supervisor, tick.demand, tick.time.now);
+  emit_changes(supervisor, tick.time.now);
+  if (!tick.released) emit_proxy_changes(tick.demand, tick.time.now);
   show_wait(supervisor.state(),
             wrenchd::wait_reason(supervisor.state(), supervisor.faults(), tick.reading.sample, tick.demand,
                                  tick.time.now),
@@ -154,7 +155,7 @@ void Telemetry::publish_release(TimePoint now, const Supervisor& supervisor, con
   record_.external_balance_J = 0.0;
   record_demand(demand, record_);
   record_state(supervisor, record_);
-  emit_changes(supervisor, demand, now);
+  emit_changes(supervisor, now);
   show_wait(supervisor.state(), {}, now);
   events_.emit(now, Event::Released{});
   show(rendering, demand.contact.crossfading);
@@ -169,16 +170,17 @@ void Telemetry::show(const Rendering& rendering, bool crossfading) noexcept {
   if (shared_state_ != nullptr) shared_state_->write(record_, rendering.contacts());
 }
 
-void Telemetry::emit_changes(const Supervisor& supervisor, const Demand& demand, TimePoint now) noexcept {
+void Telemetry::emit_changes(const Supervisor& supervisor, TimePoint now) noexcept {
   if (supervisor.state() != reported_state_)
     events_.emit(now, Event::StateChanged{supervisor.state(), supervisor.cause()});
   reported_state_ = supervisor.state();
-  if (demand.proxy_invalidated) reported_search_failed_ = false;
-  emit_proxy_changes(demand.contact, now);
 }
 
-/// Each change once: the search starts, it ends, it fails, the projection is infeasible.
-void Telemetry::emit_proxy_changes(const ContactState& contact, TimePoint now) noexcept {
+/// Each change once: the search starts, it ends, it fails, the projection is infeasible. A released hand has
+/// no search.
+void Telemetry::emit_proxy_changes(const Demand& demand, TimePoint now) noexcept {
+  const ContactState& contact = demand.contact;
+  if (demand.proxy_invalidated) reported_search_failed_ = false;
   if (contact.proxy_valid && !reported_proxy_valid_)
     events_.emit(now, Event::ProxyFound{(contact.X_WQ.translation_m - contact.X_WP.translation_m).norm()});
   if (!contact.proxy_valid && reported_proxy_valid_) events_.emit(now, Event::ProxySearchStarted{});

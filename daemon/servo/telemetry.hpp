@@ -98,8 +98,8 @@ class Telemetry {
   }
 
  private:
-  void emit_changes(const Supervisor& supervisor, const Demand& demand, TimePoint now) noexcept;
-  void emit_proxy_changes(const ContactState& contact, TimePoint now) noexcept;
+  void emit_changes(const Supervisor& supervisor, TimePoint now) noexcept;
+  void emit_proxy_changes(const Demand& demand, TimePoint now) noexcept;
   void show_wait(State state, const WaitReason& reason, TimePoint now) noexcept;
   void show(const Rendering& rendering, bool crossfading) noexcept;
   void show(const WaitReason& reason) noexcept;

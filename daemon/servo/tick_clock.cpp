@@ -6,7 +6,7 @@ namespace wrenchd {
 TickTime TickClock::begin(TimePoint now, TimePoint due) noexcept {
   started_ = lap_start_ = clock_.now();
   stage_ns_ = {};
-  if (ticks_ == 0 && !scene_has_started_) scene_start_ = now;
+  if (!scene_start_) scene_start_ = now;
   TickTime t;
   t.tick = ticks_++;
   t.now = now;
@@ -16,14 +16,12 @@ TickTime TickClock::begin(TimePoint now, TimePoint due) noexcept {
   t.lateness = pace_.lateness();
   t.recently_late = pace_.recently_late(now);
   t.dt_s = pace_.dt_s();
-  t.scene_time_s = seconds(now - scene_start_);
+  t.scene_time_s = seconds(now - *scene_start_);
   return t;
 }
 
 void TickClock::start_scene_at(TimePoint start) noexcept {
-  if (ticks_ > 0) return;
-  scene_start_ = start;
-  scene_has_started_ = true;
+  if (!scene_start_) scene_start_ = start;
 }
 
 TimePoint TickClock::lap(Stage stage) noexcept {

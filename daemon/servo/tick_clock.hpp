@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "core/clock.hpp"
 #include "core/fault.hpp"
@@ -33,7 +34,7 @@ class TickClock {
   /// The clock is kept by reference. pace: judges whether ticks come in time.
   TickClock(const Clock& clock, const PaceWatch& pace) noexcept : clock_(clock), pace_(pace) {}
 
-  /// Scene time is that since `start`, instead of that since the first tick. Only before the first tick.
+  /// Scene time begins at `start` instead of at the first tick. Without effect after the first tick.
   void start_scene_at(TimePoint start) noexcept;
   /// Starts a tick at `now`, which was due at `due`.
   TickTime begin(TimePoint now, TimePoint due) noexcept;
@@ -47,11 +48,10 @@ class TickClock {
  private:
   const Clock& clock_;
   PaceWatch pace_;
-  std::uint64_t ticks_ = 0;  ///< Number of ticks begun so far.
-  TimePoint scene_start_{};  ///< Scene time 0: start of tick 0, or what start_scene_at() said.
-  bool scene_has_started_ = false;
-  TimePoint started_{};    ///< Time read in begin().
-  TimePoint lap_start_{};  ///< End of the previous stage.
+  std::uint64_t ticks_ = 0;               ///< Number of ticks begun so far.
+  std::optional<TimePoint> scene_start_;  ///< Scene time 0; empty before the first tick.
+  TimePoint started_{};                   ///< Time read in begin().
+  TimePoint lap_start_{};                 ///< End of the previous stage.
   StageTimes stage_ns_{};
 };
 

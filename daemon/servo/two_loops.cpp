@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "core/state.hpp"
+#include "daemon/servo/due_time.hpp"
 #include "daemon/servo/servo_loop.hpp"
 
 namespace wrenchd {
@@ -47,13 +48,10 @@ void TwoLoops::step(Clock& clock) noexcept {
   ServoLoop* const loop = hand.loop.load(std::memory_order_acquire);
   if (loop != nullptr) tick(hand, *loop, clock.now());
   hand.due += period_;
-  const TimePoint now = clock.now();
-  if (now <= hand.due) return;
-  const auto missed = (now - hand.due) / period_ + 1;
-  hand.due += missed * period_;
+  const std::uint64_t missed = skip_missed_ticks(hand.due, period_, clock.now());
   // A loop that has just ended may be destroyed already.
-  if (loop != nullptr && hand.loop.load(std::memory_order_relaxed) == loop)
-    loop->telemetry().count_overrun(static_cast<std::uint64_t>(missed));
+  if (missed > 0 && loop != nullptr && hand.loop.load(std::memory_order_relaxed) == loop)
+    loop->telemetry().count_overrun(missed);
 }
 
 void TwoLoops::tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept {

@@ -13,8 +13,9 @@ namespace wrenchd {
 
 class ServoLoop;
 
-/// Releases the other hand after a tick that released a hand by a fault, if both tools held the same body
-/// before it. held_before: number of the body that the tool of `loop` held before the tick; 0: none. RT-safe.
+/// Releases the other hand if a fault has released the hand of `loop` and both tools hold the same body. Call
+/// it after each tick. held_before: number of the body that the tool of `loop` held before the tick, because
+/// a lost device lets go in the tick; 0: none. RT-safe.
 void release_other_hand(const ServoLoop& loop, std::size_t held_before, ServoLoop& other) noexcept;
 
 /// Ticks the servo loops of two hands in turn on one thread. The second loop ticks half a period after the
@@ -52,13 +53,13 @@ class TwoLoops {
     std::atomic<ServoLoop*> loop{nullptr};  ///< the servo thread stores null when the loop has ended
     std::atomic<bool> ending{false};
     std::atomic<Fault> fault{Fault::none};
-    TimePoint due{};  ///< of the next tick; the servo thread only
+    TimePoint due{};  ///< when the next tick is due; used by the servo thread only
   };
 
   void tick(Hand& hand, ServoLoop& loop, TimePoint now) noexcept;
 
   Duration period_;
-  std::optional<TimePoint> scene_start_;  ///< the first tick of either hand
+  std::optional<TimePoint> scene_start_;  ///< time of the first tick of either hand
   std::array<Hand, kHands> hands_;
 };
 

@@ -130,6 +130,9 @@ TEST_CASE("two hands press in virtual time, half a period apart, each with its o
   CHECK(largest_force_N(run.left) <= 2.0 + 1e-9);
   CHECK(run.left.ticks[1000].X_WP[1] - run.first.ticks[1000].X_WP[1] == Approx(0.15).margin(0.01));
   CHECK_THAT(run.result.err, Contains("left: state: active") && Contains("info state: active"));
+  // A tool that leaves the world with its hand is searched for by nobody.
+  const std::string after = run.result.err.substr(run.result.err.find("state: shutdown"));
+  CHECK_THAT(after, !Contains("proxy initialization"));
 }
 
 TEST_CASE("two runs of two hands in virtual time give the same ticks", "[two_hands]") {

@@ -130,14 +130,17 @@ Outcome run(std::uint64_t seed, bool bodies) {
   return run(random, rig, bodies);
 }
 
-/// The same with two hands: faults of the first one, and commands for both.
+/// The same with two hands: faults of one of them, and commands for both.
 Outcome run_two_hands(std::uint64_t seed) {
   RandomValues random(seed);
   TwoRigs rigs(static_cast<Phase>(random.integer(0, 2)));
-  rigs.first.other = &rigs.second;
-  rigs.second.arms_itself = true;
-  Outcome outcome = run(random, rigs.first, true);
-  if (outcome.broken.empty()) outcome.broken = rigs.second.violation();
+  const bool second_fails = random.integer(0, 1) == 1;
+  FaultRig& failing = second_fails ? rigs.second : rigs.first;
+  FaultRig& other = second_fails ? rigs.first : rigs.second;
+  failing.other = &other;
+  other.arms_itself = true;
+  Outcome outcome = run(random, failing, true);
+  if (outcome.broken.empty()) outcome.broken = other.violation();
   return outcome;
 }
 

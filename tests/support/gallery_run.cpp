@@ -76,15 +76,15 @@ GalleryRun run_two_hands(const std::string& name, double seconds) {
   TimePoint first{};
   while (run.scene_time_s.empty() || run.scene_time_s.back() < last_s) {
     both.step();
-    if (both.hands[1].last.now_ns > both.hands[0].last.now_ns) {
-      run.second_ticks.push_back(both.hands[1].last);
+    if (both.last[1].now_ns > both.last[0].now_ns) {
+      run.second_ticks.push_back(both.last[1]);
       continue;
     }
     if (run.ticks.empty()) {
       first = both.clock.now();
       both.arm();
     }
-    run.ticks.push_back(both.hands[0].last);
+    run.ticks.push_back(both.last[0]);
     run.scene_time_s.push_back(wrenchd::seconds(both.clock.now() - first));
   }
   return run;

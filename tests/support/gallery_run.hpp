@@ -13,9 +13,9 @@ namespace wrenchd::test {
 struct GalleryRun {
   RunConfig config;
   std::vector<TickRecord> ticks;
-  std::vector<double> scene_time_s;  ///< scene time of each tick
-  RunConfig second_config = {};  ///< of the second hand of a scene for two hands, whose ticks these are not
-  std::vector<TickRecord> second_ticks = {};
+  std::vector<double> scene_time_s;           ///< scene time of each tick
+  RunConfig second_config = {};               ///< configuration of the second hand, if the scene has two
+  std::vector<TickRecord> second_ticks = {};  ///< ticks of the second hand; `ticks` are those of the first
 };
 
 /// Returns the configuration of a gallery scene as shipped, without the self-test.

@@ -3,53 +3,40 @@
 
 #include <array>
 #include <chrono>
-#include <cstdint>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "daemon/hand_scenes.hpp"
 #include "daemon/servo/two_loops.hpp"
-#include "devices/links/simulated_link.hpp"
-#include "tests/support/shipped_config.hpp"
+#include "tests/support/simulated_hand.hpp"
 
 namespace wrenchd::test {
 
-/// One of two simulated hands in virtual time.
-struct VirtualHand {
-  std::unique_ptr<SimulatedLink> link;
-  std::unique_ptr<Runtime> runtime;
-  TickRecord last;
-
-  VirtualHand(const RunConfig& config, Clock& clock, const MeshLoader& meshes, const HandScene& scene)
-      : link(make_simulated_link(config.profile, config.settings.simulation, clock)),
-        runtime(std::make_unique<Runtime>(config, *link, clock, ProxySearchMode::in_tick, meshes, scene)) {
-    runtime->open();
-  }
-  ServoLoop& loop() const { return runtime->loop(); }
-  State state() const { return static_cast<State>(last.state); }
-  /// Force on the hand in the world [N]: the base is parallel to it.
-  Vector3d force_N() const { return {last.F_out[0], last.F_out[1], last.F_out[2]}; }
-  Vector3d tool_m() const { return {last.X_WQ[0], last.X_WQ[1], last.X_WQ[2]}; }
-};
-
-/// Two hands in one world, in virtual time, without a self-test.
+/// Two simulated hands in one world, in virtual time, without a self-test.
 struct TwoHands {
   VirtualClock clock;
   std::vector<RunConfig> configs;
+  MeshLoader meshes;
   std::array<HandScene, 2> scenes;
-  std::vector<VirtualHand> hands;
+  SimulatedHand first, second;
+  std::array<SimulatedHand*, 2> hands = {&first, &second};
+  std::array<TickRecord, 2> last;  ///< newest record of each hand
   TwoLoops loops;
 
   /// second_is_there: false if the device of the second hand comes later, by loops.attach().
   explicit TwoHands(std::vector<RunConfig> both, bool second_is_there = true)
-      : configs(std::move(both)), loops(clock.now(), std::chrono::milliseconds(1)) {
-    MeshLoader meshes;
-    scenes = make_hand_scenes(configs[0], configs[1], meshes);
-    for (std::size_t i = 0; i < 2; ++i) hands.emplace_back(configs[i], clock, meshes, scenes[i]);
-    for (std::size_t i = 0; i < (second_is_there ? 2U : 1U); ++i) loops.attach(i, hands[i].loop());
+      : configs(std::move(both)),
+        scenes(make_hand_scenes(configs[0], configs[1], meshes)),
+        first(configs[0], clock, ProxySearchMode::in_tick, meshes, scenes[0]),
+        second(configs[1], clock, ProxySearchMode::in_tick, meshes, scenes[1]),
+        loops(clock.now(), std::chrono::milliseconds(1)) {
+    loops.attach(0, first.loop());
+    if (second_is_there) loops.attach(1, second.loop());
   }
+  TwoHands(const TwoHands&) = delete;
+  TwoHands& operator=(const TwoHands&) = delete;
+
   /// Both configurations of a scene of the gallery.
   static std::vector<RunConfig> gallery(const std::string& name) {
     std::vector<RunConfig> out =
@@ -59,17 +46,16 @@ struct TwoHands {
     return out;
   }
   void arm() {
-    for (VirtualHand& hand : hands) hand.loop().requests().arm();
+    for (SimulatedHand* hand : hands) hand->loop().requests().arm();
   }
+  /// The next tick of either hand.
   void step() {
     loops.step(clock);
-    for (VirtualHand& hand : hands) hand.loop().telemetry().latest_record().read(hand.last);
+    for (std::size_t i = 0; i < hands.size(); ++i) last[i] = hands[i]->newest();
   }
   void run_until(double time_s) {
     while (clock.now() < TimePoint{} + from_seconds(time_s)) step();
   }
-  Vector3d plate_m() const { return {hands[0].last.X_WB[0], hands[0].last.X_WB[1], hands[0].last.X_WB[2]}; }
-  std::uint8_t held(std::size_t i) const { return static_cast<std::uint8_t>(hands[i].loop().held_body()); }
 };
 
 }  // namespace wrenchd::test

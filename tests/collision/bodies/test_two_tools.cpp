@@ -60,7 +60,7 @@ std::vector<FreeBody> bodies_of(bool with_plate, double friction) {
 }
 
 /// Two tools of 20 mm, left and right of a plate on a table, or above it.
-struct TwoHands {
+struct TwoTools {
   const Scene scene = Scene(tool(), {HalfSpaceSettings{"table", Vector3d::UnitZ(), 0.0}});
   BodyWorld world;
   std::array<BodyWorld::Hand, 2> hands;
@@ -68,7 +68,7 @@ struct TwoHands {
   std::uint64_t allocations = 0;
   bool with_plate;
 
-  explicit TwoHands(const std::array<Vector3d, 2>& start_m, bool plate = true, double friction = 0.8)
+  explicit TwoTools(const std::array<Vector3d, 2>& start_m, bool plate = true, double friction = 0.8)
       : world(scene, bodies_of(plate, friction), settings(friction)), with_plate(plate) {
     for (std::size_t i = 0; i < 2; ++i) {
       hands[i] = {Pose{Quaterniond::Identity(), start_m[i]}, kStiffness_per_s2};
@@ -78,7 +78,7 @@ struct TwoHands {
   static BodyWorld::Settings settings(double friction) {
     BodyWorld::Settings out;
     out.tool_friction = friction;
-    out.grasp = {1e3, 1e3};  // no grasp breaks: the return of a tool is measured where it is meant
+    out.grasp = {1e3, 1e3};  // no grasp breaks
     return out;
   }
   const Pose& X_WT(std::size_t i) const { return world.motion(world.body_of(i)).X_WB; }
@@ -91,7 +91,7 @@ struct TwoHands {
   }
   double stored_J() const { return spring_J(0) + spring_J(1) + world.energy_J(); }
 
-  /// One step of a hand, whose pose is what it is. The energy never rises in it.
+  /// One step of a hand: adds up by how much it changes the energy of springs and bodies.
   void step(std::size_t i) {
     const double before_J = stored_J();
     {
@@ -125,14 +125,18 @@ const std::array<Vector3d, 2> kBeside = {Vector3d(-0.0605, 0.0, 0.0101), Vector3
 const std::array<Vector3d, 2> kAbove = {Vector3d(-0.035, 0.0, 0.0305), Vector3d(0.035, 0.0, 0.0305)};
 const Vector3d kZero = Vector3d::Zero();
 
-void touch_from_above(TwoHands& h) {
+/// Both hands touch the plate from above, grasp it and lift it by 50 mm.
+void lift_together(TwoTools& h) {
   h.move({0.0, 0.0, -0.001}, {0.0, 0.0, -0.001}, 0.05);
+  REQUIRE(h.world.grasp(0));
+  REQUIRE(h.world.grasp(1));
+  h.move({0.0, 0.0, 0.05}, {0.0, 0.0, 0.05}, 1.0);
 }
 
 }  // namespace
 
 TEST_CASE("two hands squeeze a plate and carry it by friction", "[two_tools]") {
-  TwoHands h(kBeside);
+  TwoTools h(kBeside);
   h.move({0.003, 0.0, 0.0}, {-0.003, 0.0, 0.0}, 0.2);
   h.move({0.0, 0.0, 0.05}, {0.0, 0.0, 0.05}, 1.0);
   h.move({0.0, 0.03, 0.0}, {0.0, 0.03, 0.0}, 1.0);
@@ -147,34 +151,31 @@ TEST_CASE("two hands squeeze a plate and carry it by friction", "[two_tools]") {
 }
 
 TEST_CASE("two hands hold one plate and share its weight", "[two_tools]") {
-  TwoHands h(kAbove);
-  touch_from_above(h);
-  REQUIRE(h.world.grasp(0));
-  REQUIRE(h.world.grasp(1));
+  TwoTools h(kAbove);
+  lift_together(h);
   CHECK(h.world.held_body(0) == 1);
   CHECK(h.world.held_body(1) == 1);
   const Pose X_AB = inverse(h.X_WT(0)) * h.X_WT(1);
-  h.move({0.0, 0.0, 0.05}, {0.0, 0.0, 0.05}, 1.0);
   h.move(kZero, kZero, 3.0);
   CHECK(h.X_WB().translation_m.z() > 0.055);
-  CHECK(log(inverse(X_AB) * (inverse(h.X_WT(0)) * h.X_WT(1))).norm() < 1e-12);  // one rigid body
-  for (const std::size_t i : {0U, 1U})
+  for (const std::size_t i : {0U, 1U}) {
     CHECK(h.F_T(i).force_N.z() == Approx(-0.5 * kPlateMass_kg * kGravity_m_per_s2).epsilon(1e-3));
+    CHECK(h.world.tool_load_W(i).force_N.z() ==
+          Approx(-0.5 * kPlateMass_kg * kGravity_m_per_s2).epsilon(1e-3));
+  }
   // Each hand feels the pull of the other through the plate.
   h.move({0.0, -0.002, 0.0}, {0.0, 0.002, 0.0}, 0.2);
   h.move({-0.002, 0.0, 0.0}, {0.002, 0.0, 0.0}, 0.2);
   h.move(kZero, kZero, 2.0);
   CHECK(h.F_T(0).force_N.x() > 1.0);
   CHECK(h.F_T(0).force_N.x() == Approx(-h.F_T(1).force_N.x()).epsilon(1e-3));
+  CHECK(log(inverse(X_AB) * (inverse(h.X_WT(0)) * h.X_WT(1))).norm() < 1e-12);  // one rigid body
   CHECK(h.gained_J < 6e-6);
 }
 
 TEST_CASE("a plate changes hands without a jump", "[two_tools]") {
-  TwoHands h(kAbove);
-  touch_from_above(h);
-  REQUIRE(h.world.grasp(0));
-  REQUIRE(h.world.grasp(1));
-  h.move({0.0, 0.0, 0.05}, {0.0, 0.0, 0.05}, 1.0);
+  TwoTools h(kAbove);
+  lift_together(h);
   h.move(kZero, kZero, 2.0);
   h.world.let_go(0);
   CHECK(h.world.held_body(0) == 0);
@@ -198,16 +199,21 @@ TEST_CASE("a plate changes hands without a jump", "[two_tools]") {
 }
 
 TEST_CASE("two tools press on each other, and work passes from one hand to the other", "[two_tools]") {
-  TwoHands h({Vector3d(-0.02, 0.0, 0.05), Vector3d(0.02, 0.0, 0.05)}, false, 0.0);
+  TwoTools h({Vector3d(-0.02, 0.0, 0.05), Vector3d(0.02, 0.0, 0.05)}, false, 0.0);
   double on_first_J = 0.0, on_second_J = 0.0;
+  std::array<double, 2> by_hand_J{};  // what each hand does by moving its pose
+  const auto move_hand = [&](std::size_t i, const Vector3d& by_m) {
+    const double before_J = h.spring_J(i);
+    h.hands[i].X_WP.translation_m += by_m;
+    by_hand_J[i] += h.spring_J(i) - before_J;
+    h.step(i);
+  };
   const auto move = [&](const Vector3d& first_m, const Vector3d& second_m, double seconds) {
     const int ticks = static_cast<int>(std::lround(seconds / kTick_s));
     for (int k = 0; k < ticks; ++k) {
-      h.hands[0].X_WP.translation_m += first_m / ticks;
-      h.step(0);
+      move_hand(0, first_m / ticks);
       on_first_J += h.world.work_on_tool_J(0);
-      h.hands[1].X_WP.translation_m += second_m / ticks;
-      h.step(1);
+      move_hand(1, second_m / ticks);
       on_second_J += h.world.work_on_tool_J(1);
     }
   };
@@ -216,18 +222,22 @@ TEST_CASE("two tools press on each other, and work passes from one hand to the o
   CHECK(h.F_T(0).force_N.x() < -1.0);
   CHECK(h.F_T(0).force_N.x() == Approx(-h.F_T(1).force_N.x()).epsilon(1e-6));
   on_first_J = on_second_J = 0.0;
-  const double before_J = h.spring_J(0);
+  by_hand_J = {};
+  const double before_J = h.spring_J(0), second_before_J = h.spring_J(1);
   move({0.02, 0.0, 0.0}, {0.02, 0.0, 0.0}, 1.0);  // the first hand pushes the second one along
   move(kZero, kZero, 0.01);
   CHECK(on_second_J > 0.01);
   CHECK(std::abs(on_first_J + on_second_J) < 1e-6);
   CHECK(h.spring_J(0) == Approx(before_J).epsilon(1e-3));
+  // A step dissipates the square of what the pose moved in it: 0.2 mJ in all.
+  CHECK(h.spring_J(0) - before_J == Approx(by_hand_J[0] + on_first_J).margin(5e-4));
+  CHECK(h.spring_J(1) - second_before_J == Approx(by_hand_J[1] + on_second_J).margin(5e-4));
   CHECK_FALSE(h.any_overlap());
 }
 
 TEST_CASE("a tool that is out of the world is in nobody's way, and enters where there is room",
           "[two_tools]") {
-  TwoHands h({Vector3d(-0.02, 0.0, 0.05), Vector3d(0.02, 0.0, 0.05)}, false, 0.0);
+  TwoTools h({Vector3d(-0.02, 0.0, 0.05), Vector3d(0.02, 0.0, 0.05)}, false, 0.0);
   h.world.remove_tool(1);
   CHECK_FALSE(h.world.has_hand(1));
   for (int k = 0; k < 100; ++k) {
@@ -243,11 +253,8 @@ TEST_CASE("a tool that is out of the world is in nobody's way, and enters where 
 }
 
 TEST_CASE("a hand that leaves lets go; the other one keeps the plate", "[two_tools]") {
-  TwoHands h(kAbove);
-  touch_from_above(h);
-  REQUIRE(h.world.grasp(0));
-  REQUIRE(h.world.grasp(1));
-  h.move({0.0, 0.0, 0.05}, {0.0, 0.0, 0.05}, 1.0);
+  TwoTools h(kAbove);
+  lift_together(h);
   h.world.remove_tool(0);
   double mean_N = 0.0;
   for (int k = 0; k < 8000; ++k) {
@@ -262,7 +269,7 @@ TEST_CASE("a hand that leaves lets go; the other one keeps the plate", "[two_too
 TEST_CASE("random motions of two hands: no overlap, no energy from the scheme, no allocation",
           "[two_tools]") {
   const auto seed = GENERATE(range(1U, 9U));
-  TwoHands h(seed % 2 == 0 ? kBeside : kAbove);
+  TwoTools h(seed % 2 == 0 ? kBeside : kAbove);
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> share(-1.0, 1.0);
   int grasps = 0;

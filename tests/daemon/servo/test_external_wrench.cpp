@@ -4,11 +4,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "config/load_profile.hpp"
 #include "daemon/servo/external_wrench.hpp"
-#include "devices/links/simulated_link.hpp"
+#include "tests/support/emulated_run.hpp"
 #include "tests/support/no_allocation.hpp"
-#include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 
 namespace wrenchd {
@@ -145,27 +143,24 @@ TEST_CASE("on a device with a longer delay an external wrench needs a larger res
 
 TEST_CASE("components without a motor are left out of an external wrench, and the record says which",
           "[external_wrench]") {
-  RunConfig config = shipped_config();  // its hand moves, and the self-test sees that
-  config.profile =
-      load_profile(source_path("config/profiles/polhem.toml"), SearchPath({source_path("config")}));
-  VirtualClock clock;
-  const auto link = make_simulated_link(config.profile, config.settings.simulation, clock);
-  Runtime runtime(config, *link, clock, ProxySearchMode::in_tick);
-  runtime.open();
-  runtime.loop().requests().arm();
-  TickRecord last;
-  for (int k = 0; k < 4000; ++k) {
-    clock.sleep_until(clock.now() + std::chrono::milliseconds(1));
-    runtime.loop().requests().set_external_wrench(
-        {{{0.0, 0.0, 2.0}, {0.0, 0.1, 0.0}}, 0.1, clock.now() + from_seconds(0.1)});
-    REQUIRE(runtime.loop().tick(clock.now(), clock.now()) == Fault::none);
-    runtime.loop().telemetry().latest_record().read(last);
-    REQUIRE(last.F_external[4] == 0.0);
-  }
-  REQUIRE(static_cast<State>(last.state) == State::active);
-  CHECK(last.F_external[2] > 1.0);
-  CHECK(last.requested_external[4] == Approx(0.1));
-  CHECK((last.undriven_dofs & (1U << 4U)) != 0);
+  // The hand moves to and fro above the table.
+  EmulatedRun run(prescribed_motion(
+      "polhem",
+      [](double t_s) {
+        return Pose{Quaterniond::Identity(), {0.02 * std::sin(t_s), 0.0, 0.08}};
+      },
+      4.0));
+  run.run_until(0.5);
+  run.arm();
+  run.run_until(4.0, [&run] {
+    run.runtime.loop().requests().set_external_wrench(
+        {{{0.0, 0.0, 2.0}, {0.0, 0.1, 0.0}}, 0.1, run.clock.now() + from_seconds(0.1)});
+    REQUIRE(run.record.F_external[4] == 0.0);
+  });
+  REQUIRE(run.state() == State::active);
+  CHECK(run.record.F_external[2] > 1.0);
+  CHECK(run.record.requested_external[4] == Approx(0.1));
+  CHECK((run.record.undriven_dofs & (1U << 4U)) != 0);
 }
 
 TEST_CASE("the limits hold for the sum of contact and external wrench", "[external_wrench]") {

@@ -13,7 +13,7 @@
 #include "daemon/wall_clock.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/rate_check.hpp"
-#include "tests/support/shipped_config.hpp"
+#include "tests/support/simulated_hand.hpp"
 #include "tests/support/soon.hpp"
 
 namespace wrenchd {
@@ -21,30 +21,6 @@ namespace {
 
 using namespace test;
 using namespace std::chrono_literals;
-
-/// A hand with an open simulated device, on a clock that both hands share.
-struct SimulatedHand {
-  SimulatedDevice device;
-  LoopbackLink link;
-  Runtime runtime;
-
-  SimulatedHand(const RunConfig& config, Clock& clock, ProxySearchMode search)
-      : device(config.profile, config.settings.simulation),
-        link(device, clock, config.settings.simulation),
-        runtime(config, link, clock, search) {
-    runtime.enable_shared_state();
-    runtime.open();
-  }
-
-  ServoLoop& loop() { return runtime.loop(); }
-  State state() { return loop().telemetry().state(); }
-  std::uint64_t ticks() { return loop().telemetry().timing().tick.count(); }
-  TickRecord newest() {
-    TickRecord record;
-    REQUIRE(loop().telemetry().latest_record().read(record));
-    return record;
-  }
-};
 
 template <class TheClock>
 struct TwoHands {

@@ -90,8 +90,8 @@ class Client:
         return self.call("reload")
 
     def arm(self, within_s=None):
-        """Arms the loop. Requires the lease. With within_s, waits until the loop is active, and before until the force of
-        another program has faded. Raises Rejected if a fault prevents it, and Timeout with the reason after within_s."""
+        """Arms the loop. Requires the lease. With within_s it returns when the loop is active; if the force of another program
+        still fades, it arms after that. Raises Rejected if a fault prevents arming, and Timeout with the reason after within_s."""
         if within_s is None:
             return self.call("arm")
         ends_s = time.monotonic() + within_s
