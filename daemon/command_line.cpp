@@ -2,8 +2,12 @@
 #include "daemon/command_line.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
+#include <iterator>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -55,6 +59,19 @@ std::vector<std::string> visible_subcommands(const CLI::App& app) {
   return names;
 }
 
+/// Returns the command that has an option of this name, or the nearest one; "" is no name.
+std::pair<const CLI::App*, std::string> command_with_option(const CLI::App& app, const std::string& typed) {
+  std::pair<const CLI::App*, std::string> near;
+  for (const CLI::App* other : app.get_subcommands({})) {
+    if (other->get_group().empty()) continue;
+    const std::vector<std::string> theirs = long_options(*other);
+    if (std::find(theirs.begin(), theirs.end(), typed) != theirs.end()) return {other, typed};
+    const std::string name = nearest_name(typed, theirs);
+    if (near.second.empty() && !name.empty()) near = {other, name};
+  }
+  return near;
+}
+
 /// Returns advice about an option that no command on the line has in this place.
 std::string option_advice(const CLI::App& app, const std::string& word) {
   const CLI::App& command = innermost(app);
@@ -65,23 +82,43 @@ std::string option_advice(const CLI::App& app, const std::string& word) {
                                   : "; did you mean '--" + typed + "'?";
   if (const std::string near = nearest_name(typed, known); !near.empty())
     return "; did you mean '--" + near + "'?";
-  for (const CLI::App* other : app.get_subcommands({})) {
-    if (&command != &app) break;
-    const std::vector<std::string> theirs = long_options(*other);
-    if (std::find(theirs.begin(), theirs.end(), typed) != theirs.end())
-      return "; it is an option of commands such as '" + full_name(*other) + "'";
-  }
+  for (const CLI::Option* option : command.get_options({}))
+    if (option->get_positional() && option->get_name() == typed)
+      return "; give the " + typed + " without '" + name_of(word) + "'";
+  if (const auto [other, name] = command_with_option(app, typed); other != nullptr)
+    return "; '--" + name + "' is an option of commands such as '" + full_name(*other) + "'";
   return "; " + full_name(command) + " --help lists the options";
+}
+
+/// Returns whether a text has this word, in upper or lower case.
+bool has_word(std::string text, std::string word) {
+  for (char& c : text)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = ' ';
+  std::istringstream words(CLI::detail::to_lower(text));
+  return std::find(std::istream_iterator<std::string>(words), {}, CLI::detail::to_lower(word)) !=
+         std::istream_iterator<std::string>();
+}
+
+/// Returns advice about a word in the place of a command: the nearest command, or those whose description has
+/// the word.
+std::string command_advice(const CLI::App& command, const std::string& word) {
+  constexpr std::size_t kMostCommands = 3;
+  if (const std::string near = nearest_name_advice(word, visible_subcommands(command)); !near.empty())
+    return near;
+  if (!nearest_name(word, {"help"}).empty()) return "; did you mean '--help'?";
+  std::vector<std::string> about;
+  for (const CLI::App* other : command.get_subcommands({}))
+    if (!other->get_group().empty() && has_word(other->get_description(), word))
+      about.push_back("'" + full_name(*other) + "'");
+  const std::string help = "; " + full_name(command) + " --help lists the commands";
+  if (about.empty() || about.size() > kMostCommands) return help;
+  return help + "; about it: " + CLI::detail::join(about, ", ");
 }
 
 /// Returns advice about a word that is neither an option nor the value of one.
 std::string word_advice(const CLI::App& app, const std::string& word) {
   const CLI::App& command = innermost(app);
-  const std::vector<std::string> subcommands = visible_subcommands(command);
-  if (!subcommands.empty()) {
-    const std::string advice = nearest_name_advice(word, subcommands);
-    return advice.empty() ? "; " + full_name(command) + " --help lists the commands" : advice;
-  }
+  if (!visible_subcommands(command).empty()) return command_advice(command, word);
   return "; " + full_name(command) + " --help shows what it accepts";
 }
 

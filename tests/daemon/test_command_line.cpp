@@ -15,19 +15,20 @@ namespace {
 
 using Catch::Contains;
 
-/// A program with the commands status and mesh, which has the options --make and --triangles.
+/// A program with the commands status, solve and mesh.
 struct Program {
   CLI::App app{"", "program"};
-  std::string kind;
+  std::string kind, scene;
   int triangles = 0;
   bool json = false;
 
   Program() {
     app.require_subcommand(0, 1);
-    app.add_subcommand("status")->add_flag("--json", json);
+    app.add_subcommand("status", "Show state, cause and lease")->add_flag("--json", json);
     CLI::App* mesh = app.add_subcommand("mesh");
     std::vector<std::string>& files = files_;
     CLI::Option* file = mesh->add_option("files", files);
+    app.add_subcommand("solve")->add_option("scene", scene);
     mesh->add_option("--make", kind)->check(one_of({"cube", "gear"}))->excludes(file);
     mesh->add_option("--triangles", triangles);
     app.add_subcommand("names")->group("");
@@ -60,6 +61,9 @@ TEST_CASE("a mistyped command has the nearest command", "[command_line]") {
   CHECK_THAT(mistake({"stauts"}), Contains("not expected: stauts; did you mean 'status'?"));
   CHECK_THAT(mistake({"mehs", "--make", "gear"}), Contains("not expected: mehs; did you mean 'mesh'?"));
   CHECK_THAT(mistake({"dance"}), Contains("not expected: dance; program --help lists the commands"));
+  CHECK_THAT(mistake({"hepl"}), Contains("did you mean '--help'?"));
+  CHECK_THAT(mistake({"Lease"}), Contains("--help lists the commands; about it: 'program status'"));
+  CHECK_THAT(mistake({"leas\\.*"}), !Contains("about it"));
   CHECK_THAT(mistake({"nams"}), !Contains("did you mean"));  // the help hides it
   CHECK_THAT(mistake({"status", "now"}), Contains("program status --help shows what it accepts"));
 }
@@ -75,6 +79,9 @@ TEST_CASE("a mistyped option has the nearest option, whatever its value causes",
 
 TEST_CASE("an option in the wrong place is sent to its command", "[command_line]") {
   CHECK_THAT(mistake({"--json", "status"}), Contains("--json; it belongs after 'status'"));
+  CHECK_THAT(mistake({"mesh", "--jsn"}),
+             Contains("'--json' is an option of commands such as 'program status'"));
+  CHECK_THAT(mistake({"solve", "--scene", "a.toml"}), Contains("give the scene without '--scene'"));
   CHECK_THAT(mistake({"--json"}), Contains("an option of commands such as 'program status'"));
 }
 

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/option_checks.hpp"
 #include "tests/support/gallery_comparison.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/support/sweep_comparison.hpp"
@@ -82,7 +83,7 @@ int main(int argc, char** argv) {
       "compares the proxies in the gallery instead: open loop, where both follow the same poses, and "
       "closed loop, where each hand feels its own forces");
   app.add_option("--seconds", seconds, "maximum duration of a gallery scene; 0: the whole hand script")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_in_range(0, 1e9))
       ->capture_default_str();
   app.add_option("--only", only, "runs only scenes whose name contains this text");
   bool surfaces = false;

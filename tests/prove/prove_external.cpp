@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/option_checks.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/shipped_config.hpp"
 
@@ -199,7 +200,7 @@ class Run {
 int main(int argc, char** argv) {
   Options options;
   CLI::App app("Random programs act on the hand by external wrenches.");
-  app.add_option("--programs", options.programs, "number of programs")->check(CLI::PositiveNumber);
+  app.add_option("--programs", options.programs, "number of programs")->check(number_in_range(1, 1e9));
   app.add_option("--seed", options.seed, "seed of the first run");
   app.add_option("--counted", options.counted, "share of the declared energy that the ledger counts");
   CLI11_PARSE(app, argc, argv);

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/option_checks.hpp"
 #include "tests/support/fault_rig.hpp"
 #include "tests/support/random_values.hpp"
 
@@ -150,7 +151,7 @@ int main(int argc, char** argv) {
   CLI::App app("Random schedules of faults; checks every tick against the invariants.");
   long schedules = 1000;
   std::uint64_t seed = 1;
-  app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);
+  app.add_option("--schedules", schedules)->check(number_in_range(1, 1e9));
   app.add_option("--seed", seed);
   bool bodies = false;
   app.add_flag("--bodies", bodies,

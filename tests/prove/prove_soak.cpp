@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <sys/resource.h>
 
+#include "daemon/option_checks.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulation/hand_path.hpp"
 #include "devices/simulation/simulated_firmware.hpp"
@@ -104,7 +105,7 @@ class HeldHandle final : public ReportLink {
 int main(int argc, char** argv) {
   CLI::App app("Runs the shipped scene for hours in virtual time.");
   double minutes = 5.0;
-  app.add_option("--minutes", minutes, "duration in virtual time [min]")->check(CLI::PositiveNumber);
+  app.add_option("--minutes", minutes, "duration in virtual time [min]")->check(number_in_range(0.001, 1e6));
   std::uint64_t seed = 1;
   app.add_option("--seed", seed, "unused: all runs are equal");
   CLI11_PARSE(app, argc, argv);

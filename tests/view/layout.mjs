@@ -44,12 +44,12 @@ function defects({ groups, scrolled }) {
   return found;
 }
 
-/** Returns the arrows that begin well inside the picture and end outside of it, and the number of arrows that begin there. Runs
+/** Returns the arrows that begin inside the picture and end outside of it, and the number of arrows that begin there. Runs
  * in the page. */
 function arrowsOutside() {
   const { left, right, top, bottom } = document.getElementById("canvas").getBoundingClientRect();
   const inside = ([x, y], margin = -1) => x >= left + margin && x <= right - margin && y >= top + margin && y <= bottom - margin;
-  const arrows = window.view.arrows().filter(([from]) => inside(from, (right - left) / 10));
+  const arrows = window.view.arrows().filter(([from]) => inside(from, (right - left) / 50));
   return { count: arrows.length, outside: arrows.filter(([, to]) => !inside(to)).map(([, to]) => to.join()) };
 }
 

@@ -100,7 +100,7 @@ class DeviceCommands final : public Subcommand {
     conform
         ->add_option("--link-fd", conform_.link_fd,
                      "inherited socket of a device in another process, instead of a connected device")
-        ->check(CLI::NonNegativeNumber)
+        ->check(number_in_range(0, 1e9))
         ->excludes(node);
     conform
         ->add_option("--motion", conform_.motion_s,

@@ -41,15 +41,16 @@ const INSIDE = 0.96;  // of the half width and half height of the picture
 
 /** Returns the share of a line that is inside the picture, from its start; 1 if its start is outside. */
 function shareInside(from, along, camera) {
-  const inside = (share) => {
+  const inside = (share, border) => {
     const at = from.clone().addScaledVector(along, share).project(camera);
-    return Math.abs(at.x) <= INSIDE && Math.abs(at.y) <= INSIDE && at.z < 1;
+    return Math.abs(at.x) <= border && Math.abs(at.y) <= border && at.z < 1;
   };
-  if (inside(1) || !inside(0)) return 1;
+  const border = inside(0, INSIDE) ? INSIDE : 1;
+  if (inside(1, border) || !inside(0, border)) return 1;
   let low = 0, high = 1;
   for (let i = 0; i < 20; ++i) {
     const middle = (low + high) / 2;
-    if (inside(middle)) low = middle;
+    if (inside(middle, border)) low = middle;
     else high = middle;
   }
   return low;
@@ -73,12 +74,18 @@ class Arrow extends THREE.Group {
     this.point(from, along, thickness);
   }
 
-  /** Shortens the arrow so that it ends inside the picture; a shortened arrow has a second head. */
+  hide() {
+    this.aimed = undefined;
+    this.visible = false;
+  }
+
+  /** Shortens the arrow so that it ends inside the picture, but not below its thickness; a shortened arrow has a second head. */
   fitInto(camera) {
-    if (!this.aimed || !this.visible) return;
+    if (!this.aimed) return;
     const { from, along, thickness } = this.aimed;
     const share = shareInside(from, along, camera);
-    this.point(from, along.clone().multiplyScalar(share), thickness);
+    const length = Math.max(share * along.length(), Math.min(along.length(), 2 * thickness));
+    this.point(from, along.clone().setLength(length), thickness);
     this.second.visible = share < 1;
   }
 
@@ -305,8 +312,8 @@ export class World {
       this.contacts.push({ point, normal });
     }
     this.contacts.forEach(({ point, normal }, i) => {
-      point.visible = normal.visible = i < contacts.length;
-      if (i >= contacts.length) return;
+      point.visible = i < contacts.length;
+      if (!point.visible) return normal.hide();
       const { p, n, load_fraction, force_N } = contacts[i];
       point.position.set(...p);
       point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(load_fraction ?? 0)));
