@@ -152,6 +152,11 @@ class BodyWorld {
 
  private:
   static constexpr std::size_t kNoTool = SIZE_MAX;
+  /// Least gap of an admissible pose, least gap at which a contact is held, which leaves room for the
+  /// tolerance of a cone, and largest gap of a contact that touches, as multiples of the clearance.
+  static constexpr double kMinClearance = 0.2, kLeastHold = 0.3, kTouch = 1.1;
+  /// Accepted violation of a cone in a Newton step [m].
+  static constexpr double kTolerance_m = 1e-11;
 
   struct Body {
     std::string name;
@@ -252,6 +257,7 @@ class BodyWorld {
   void unsolve(std::size_t body) noexcept;
   void wake(std::size_t body) noexcept;
   void fall_asleep() noexcept;
+  static double shorter(double fraction) noexcept;
   void shorten(const BodyPair& pair) noexcept;
   void hold(Body& body) noexcept;
   void hold_all() noexcept;
