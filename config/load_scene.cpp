@@ -33,6 +33,7 @@ constexpr Range kDensity_kg_per_m3 = {1e-3, 1e5};
 constexpr Range kDamping_per_s = {0.0, 1e3};
 constexpr Range kGravity_m_per_s2 = {-1000.0, 1000.0};
 constexpr Range kFriction = {0.0, FrictionSettings::kMaxCoefficient};
+constexpr Range kRestitution = {0.0, 1.0};
 
 /// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
@@ -317,6 +318,7 @@ void read_body(TomlTable& table, const SceneReading& reading, const std::string&
   read_velocity(table.optional("angular_velocity_rad_per_s"), ObstacleMotion::kMaxAngularSpeed_rad_per_s,
                 body.spin_rad_per_s);
   table.optional("friction").number(body.friction, kFriction);
+  table.optional("restitution").number(body.restitution, kRestitution);
   table.optional("linear_damping_per_s").number(body.linear_damping_per_s, kDamping_per_s);
   table.optional("angular_damping_per_s").number(body.angular_damping_per_s, kDamping_per_s);
   reading.scene.bodies.push_back(std::move(body));

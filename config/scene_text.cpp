@@ -119,7 +119,8 @@ std::string free_body(const BodySettings& body) {
   if (!body.velocity_m_per_s.isZero(0.0)) text += "velocity_m_per_s = " + array(body.velocity_m_per_s) + "\n";
   if (!body.spin_rad_per_s.isZero(0.0))
     text += "angular_velocity_rad_per_s = " + array(body.spin_rad_per_s) + "\n";
-  return text + with_default("linear_damping_per_s", body.linear_damping_per_s) +
+  return text + with_default("restitution", body.restitution) +
+         with_default("linear_damping_per_s", body.linear_damping_per_s) +
          with_default("angular_damping_per_s", body.angular_damping_per_s);
 }
 

@@ -74,6 +74,7 @@ struct BodySettings {
   Vector3d velocity_m_per_s = Vector3d::Zero();  ///< of the centre of mass at the start, in W
   Vector3d spin_rad_per_s = Vector3d::Zero();    ///< angular velocity at the start, in W
   double friction = 0.5;                         ///< coefficient against obstacles
+  double restitution = 0.0;                      ///< speed after an impact over that before it
   double linear_damping_per_s = 0.0;
   double angular_damping_per_s = 0.0;
 };

@@ -50,7 +50,7 @@ Wrench WorkAccount::permit(const Wrench& requested_B, const Pose& X_BH, double s
   return sent_[tick_ % kHistory] = valid ? share * requested_B : Wrench{};
 }
 
-/// Each change of the wrench can be half an encoder step away from where it seems to be: METHOD (119).
+/// Each change of the wrench can be half an encoder step away from where it seems to be: METHOD (121).
 void WorkAccount::record_sent(const Wrench& sent_B) noexcept {
   Wrench& newest = sent_[tick_ % kHistory];
   newest = is_finite(sent_B) ? sent_B : Wrench{};
@@ -69,7 +69,7 @@ void WorkAccount::close() noexcept {
   balance_J_ = std::min(balance_J_, 0.0);
 }
 
-/// METHOD (117): the most that any wrench which may have acted since the previous sample can have given.
+/// METHOD (119): the most that any wrench which may have acted since the previous sample can have given.
 double WorkAccount::work_bound_J(const Motion& step) const noexcept {
   const auto work = [&](const Wrench& F) {
     return F.force_N.dot(step.displacement_m) + F.torque_Nm.dot(step.rotation_rad);
@@ -79,7 +79,7 @@ double WorkAccount::work_bound_J(const Motion& step) const noexcept {
   return most_J;
 }
 
-/// METHOD (118): the work that a wrench can give before its decrease acts.
+/// METHOD (120): the work that a wrench can give before its decrease acts.
 double WorkAccount::reserve_J(const Wrench& F, double tick_s) const noexcept {
   const double window_s = static_cast<double>(loop_.delay_ticks + ticks_since_sample_) * tick_s;
   const double speed_m_per_s = speed_m_per_s_ + kMaxAcceleration_m_per_s2 * window_s;

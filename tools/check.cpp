@@ -67,7 +67,8 @@ std::string about(const SceneSettings& settings, double rate_Hz, MeshLoader& mes
        << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';
   for (const FreeBody& body : scene.bodies())
     text << "  free body " << body.name << ": mass " << body.body.solid.inertia.mass_kg << " kg, "
-         << body.body.mesh.triangles.size() << " triangles, friction " << body.friction << '\n';
+         << body.body.mesh.triangles.size() << " triangles, friction " << body.friction << ", restitution "
+         << body.restitution << '\n';
   for (const std::string& simplification : meshes.simplifications()) text << "  " << simplification << '\n';
   text << cost_text(scene, rate_Hz);
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';

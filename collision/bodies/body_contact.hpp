@@ -18,8 +18,9 @@ struct BodyContact {
 
   std::size_t a = 0, b = kFixed;  ///< numbers of the bodies
   Contact contact;
-  double mu = 0.0;      ///< coefficient of friction
-  double hold_m = 0.0;  ///< gap at which it is held in this step [m]
+  double mu = 0.0;           ///< coefficient of friction
+  double restitution = 0.0;  ///< coefficient of restitution
+  double hold_m = 0.0;       ///< gap at which it is held in this step [m]
   /// Motion of the obstacle in this tick: X_WO(end) = obstacle_motion * X_WO(start). Identity for a body b.
   Pose obstacle_motion;
   Vector3d force_W_N = Vector3d::Zero();       ///< force on body a, in the last step

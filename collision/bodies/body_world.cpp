@@ -45,6 +45,7 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
     body.M = given.body.solid.inertia;
     body.forces = {settings.gravity_W_m_per_s2, given.linear_damping_per_s, given.angular_damping_per_s};
     body.friction = given.friction;
+    body.restitution = given.restitution;
     body.motion = given.motion;
     body.radius_m = meshes[i]->surface.radius_m();
     for (const Vector3d& p : given.body.hull.vertices_T_m) body.radius_m = std::max(body.radius_m, p.norm());
@@ -79,6 +80,9 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
   dropped_.reserve(kMaxContacts);
   island_contacts_.reserve(kMaxContacts);
   island_bodies_.reserve(bodies_.size());
+  impact_.contacts.reserve(kMaxContacts);
+  impact_.before.resize(bodies_.size());
+  impact_.after.resize(bodies_.size());
 }
 
 void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
@@ -122,7 +126,10 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
     clean = sweep_pairs();
     if (clean) clean = !drop_separated();
   }
-  if (!clean) hold_all();
+  if (clean)
+    rebound();
+  else
+    hold_all();
   apply_impulses(tool);
   finish_grasps();
   if (clean) time_s_ = until_s;

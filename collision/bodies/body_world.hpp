@@ -163,6 +163,7 @@ class BodyWorld {
     Inertia M;
     FreeForces forces;
     double friction = 0.0;
+    double restitution = 0.0;
     double radius_m = 0.0;
     BodyMotion motion;                     ///< at the end of the last step
     BodyMotion free;                       ///< without contact, at the end of this step
@@ -199,6 +200,19 @@ class BodyWorld {
   };
 
   enum class Friction : std::uint8_t { coulomb, frozen, none };
+
+  /// A contact of an impact, METHOD (117).
+  struct ImpactContact {
+    std::size_t contact = 0;
+    double rebound_m_per_s = 0.0;  ///< normal velocity after it, e u
+    Vector3d plastic_W_N = Vector3d::Zero(), elastic_W_N = Vector3d::Zero();  ///< forces on body a
+  };
+  /// The bodies of an island in an impact.
+  struct Impact {
+    double step_s = 0.0;  ///< time that passes for the island in the step
+    std::vector<ImpactContact> contacts;
+    std::vector<BodyMotion> before, after;  ///< of each body of the world
+  };
 
   void begin(const std::optional<Hand>& hand, std::size_t tool) noexcept;
   void save() noexcept;
@@ -261,6 +275,14 @@ class BodyWorld {
   void shorten(const BodyPair& pair) noexcept;
   void hold(Body& body) noexcept;
   void hold_all() noexcept;
+  void rebound() noexcept;
+  void rebound_island() noexcept;
+  bool find_impact(std::size_t island) noexcept;
+  Vector3d velocity_before_W(std::size_t body, const Vector3d& point_W_m) const noexcept;
+  double approach_m_per_s(const BodyContact& contact) const noexcept;
+  double time_of_impact_s(const BodyContact& contact, double approach_m_per_s) const noexcept;
+  bool solve_impact(bool elastic) noexcept;
+  double energy_rise_J(double share) noexcept;
   void apply_impulses(std::size_t tool_of_step) noexcept;
   void prefetch() noexcept;
   BodyPath path_of(std::size_t body) const noexcept;
@@ -282,6 +304,7 @@ class BodyWorld {
   bool tool_was_moved_ = false;
   std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
+  Impact impact_;
   ConeProjection cones_;
   ConeProjection::Status cones_status_ = ConeProjection::Status::optimal;
   VisitBudget budget_;

@@ -147,6 +147,9 @@ bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexce
     if (known.a == added.a && known.b == added.b && same_features(known.contact, contact)) return false;
   const Body& a = bodies_[added.a];
   added.mu = pair.is_fixed() ? a.friction : std::sqrt(a.friction * bodies_[added.b].friction);
+  added.restitution = pair.is_fixed() ? a.restitution : std::max(a.restitution, bodies_[added.b].restitution);
+  if (pair.is_fixed() && pair.scene().has_moving_obstacles())
+    added.obstacle_motion = pair.scene().obstacle_displacement(contact.obstacle, time_s_, until_s_);
   added.hold_m = held_gap_m(added, 0.0);
   added.stays = std::any_of(dropped_.begin(), dropped_.end(), [&](const BodyContact& dropped) {
     return dropped.a == added.a && dropped.b == added.b && same_features(dropped.contact, contact);

@@ -25,6 +25,7 @@ FreeBody load_free_body(const BodySettings& settings, const SceneSettings& scene
   out.motion.velocity_W_m_per_s = settings.velocity_m_per_s;
   set_angular_velocity_W(M, settings.spin_rad_per_s, out.motion);
   out.friction = settings.friction;
+  out.restitution = settings.restitution;
   out.linear_damping_per_s = settings.linear_damping_per_s;
   out.angular_damping_per_s = settings.angular_damping_per_s;
   return out;

@@ -19,6 +19,7 @@ struct FreeBody {
   ToolBody body;      ///< its mesh and inertia
   BodyMotion motion;  ///< state at the start
   double friction = 0.5;
+  double restitution = 0.0;
   double linear_damping_per_s = 0.0;
   double angular_damping_per_s = 0.0;
   bool of_hand = false;                      ///< the tool of a second hand, which moves as that hand leads it

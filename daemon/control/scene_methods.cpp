@@ -157,7 +157,8 @@ Json scene_json(Reconfigurator& reconfigurator) {
                       {"mesh", body.shape.mesh.string()},
                       {"kind", kind(body.shape.kind)},
                       {"scale", body.shape.scale},
-                      {"friction", body.friction}});
+                      {"friction", body.friction},
+                      {"restitution", body.restitution}});
   return {{"file", scene.file.string()},
           {"tool",
            {{"mesh", scene.tool.mesh.string()},

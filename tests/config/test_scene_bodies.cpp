@@ -82,13 +82,13 @@ TEST_CASE("a body may consist of several meshes", "[scene]") {
 TEST_CASE("a scene may have free bodies", "[scene]") {
   const TemporaryDirectory dir;
   const std::string tool = "[tool]\nmesh = \"a.stl\"\n";
-  const SceneSettings scene =
-      load(dir, "gravity_m_per_s2 = [0.0, 0.0, -1.62]\n" + tool +
-                    "[[body]]\nname = \"crate\"\nmesh = \"b.stl\"\nscale = 0.001\ndensity_kg_per_m3 = 700.0\n"
-                    "position_m = [0.1, 0.2, 0.3]\nrotation_vector_rad = [0.0, 0.0, 0.5]\n"
-                    "velocity_m_per_s = [1.0, 0.0, 0.0]\nangular_velocity_rad_per_s = [0.0, 2.0, 0.0]\n"
-                    "friction = 0.3\nlinear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\n"
-                    "[[body]]\nmesh = { make = \"gear\" }\nmass = 0.4\n");
+  const SceneSettings scene = load(
+      dir, "gravity_m_per_s2 = [0.0, 0.0, -1.62]\n" + tool +
+               "[[body]]\nname = \"crate\"\nmesh = \"b.stl\"\nscale = 0.001\ndensity_kg_per_m3 = 700.0\n"
+               "position_m = [0.1, 0.2, 0.3]\nrotation_vector_rad = [0.0, 0.0, 0.5]\n"
+               "velocity_m_per_s = [1.0, 0.0, 0.0]\nangular_velocity_rad_per_s = [0.0, 2.0, 0.0]\n"
+               "friction = 0.3\nrestitution = 0.6\nlinear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\n"
+               "[[body]]\nmesh = { make = \"gear\" }\nmass = 0.4\n");
   REQUIRE(scene.bodies.size() == 2);
   const BodySettings& crate = scene.bodies[0];
   CHECK(scene.gravity_W_m_per_s2 == Vector3d(0.0, 0.0, -1.62));
@@ -99,6 +99,7 @@ TEST_CASE("a scene may have free bodies", "[scene]") {
   CHECK(crate.velocity_m_per_s == Vector3d(1.0, 0.0, 0.0));
   CHECK(crate.spin_rad_per_s == Vector3d(0.0, 2.0, 0.0));
   CHECK(crate.friction == 0.3);
+  CHECK(crate.restitution == 0.6);
   CHECK(crate.linear_damping_per_s == 0.1);
   CHECK(crate.angular_damping_per_s == 0.2);
   CHECK(scene.bodies[1].name == "body[1]");
@@ -116,6 +117,7 @@ TEST_CASE("a free body with an error is rejected with its place and the remedy",
   says(tool + body + "mass = 1.0\ndensity_kg_per_m3 = 700.0\n", "keep one of 'mass' and 'density_kg_per_m3'");
   says(tool + body + "inertia = \"hull\"\ndensity_kg_per_m3 = 700.0\n", "needs the volume of a solid");
   says(tool + body + "friction = -0.1\n", "friction");
+  says(tool + body + "restitution = 1.1\n", "a number from 0 to 1");
   says(tool + body + "velocity_m_per_s = [9.0, 0.0, 0.0]\n", "a number from -5 to 5 m/s, found 9");
   says(tool + "[[body]]\nmass = 1.0\n", "mesh");
   says(tool + "[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n[[body]]\nname = \"b\"\nmesh = \"b.stl\"\n",

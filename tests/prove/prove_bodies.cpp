@@ -84,6 +84,7 @@ class RandomScene {
       body.name = "body " + std::to_string(k);
       body.body = tool_body(random_mesh(random_), 1.0, random_.log_uniform(1e-3, 10.0));
       body.friction = random_.uniform(0.0, 1.0);
+      if (random_.chance(0.5)) body.restitution = random_.uniform(0.0, 1.0);
       body.motion.X_WB = {random_.rotation(),
                           {random_.uniform(-0.04, 0.04), random_.uniform(-0.04, 0.04), 0.16 + 0.16 * k}};
       body.motion.velocity_W_m_per_s = random_.vector<3>(0.3);
