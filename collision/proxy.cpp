@@ -18,7 +18,7 @@ constexpr double kMaxStepFactor = 3.0;
 constexpr double kMinStep = 0.002;
 /// Largest rotation of a step [rad]. Points deviate from the straight path by angle^2 / 8 times their
 /// distance.
-constexpr double kMaxRotation_rad = 0.05;
+constexpr double kMaxTurn_rad = 0.05;
 /// The tick ends if the remaining fraction of a step is smaller than this.
 constexpr double kMinFraction = 1.0 / 1024.0;
 /// If a path was too long, the next tick starts with the shorter path that succeeded, but not with less than
@@ -47,7 +47,7 @@ constexpr std::uint16_t kMaxTrappedTicks = 50;
 /// A displacement by obstacles has no step limit.
 constexpr ExactProjection::StepLimit kNoStepLimit = {};
 /// Minimum relative decrease of T per round. Below it the round made no progress.
-constexpr double kMinDecrease = 1e-9;
+constexpr double kIdleDecrease = 1e-9;
 /// The tick ends after this number of rounds without progress in sequence.
 constexpr int kMaxIdleRounds = 3;
 
@@ -190,7 +190,7 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
     if (all_kept && fraction == 1.0) longest_m *= kStepGrowth;  // a long free path
     if (!reaches_optimum && fraction < 1.0) continue;
     const double T = energy(M_, X_WP, X_WQ_);
-    const bool idle = T > (1.0 - kMinDecrease) * T_last;
+    const bool idle = T > (1.0 - kIdleDecrease) * T_last;
     idle_rounds = idle ? idle_rounds + 1 : 0;
     T_last = T;
     if (!idle) continue;
@@ -278,8 +278,8 @@ Contact Proxy::contact_at(const Contact& contact, double from_s, double to_s) co
 
 /// Returns the pose nearest to p that the known contacts admit, at most longest_m from the present pose.
 Projection Proxy::step(const Pose& X_WP, double longest_m) noexcept {
-  const ExactProjection::StepLimit step_limit = {
-      longest_m, std::min(longest_m / scene_.tool_radius_m(), kMaxRotation_rad)};
+  const ExactProjection::StepLimit step_limit = {longest_m,
+                                                 std::min(longest_m / scene_.tool_radius_m(), kMaxTurn_rad)};
   const Projection q =
       exact_.step(X_WP, X_WQ_, std::span<const ActiveContact>(known_contacts_.begin(), known_contacts_.end()),
                   step_limit);

@@ -88,7 +88,7 @@ void read_command(TomlTable& table, LoopbackScript& script) {
   script.commands.push_back(command);
 }
 
-void read_script(TomlTable& table, LoopbackScript& script) {
+void read_loopback(TomlTable& table, LoopbackScript& script) {
   for (const TomlValue& fault : table.optional("fault").elements("tables, each headed [[fault]]"))
     fault.table(read_fault, script);
   for (const TomlValue& command : table.optional("command").elements("tables, each headed [[command]]"))
@@ -100,7 +100,7 @@ void read_script(TomlTable& table, LoopbackScript& script) {
 LoopbackScript load_loopback_script(const std::filesystem::path& file) {
   LoopbackScript script;
   script.file = file;
-  read_toml(file, read_script, script);
+  read_toml(file, read_loopback, script);
   std::stable_sort(script.commands.begin(), script.commands.end(),
                    [](const TimedCommand& a, const TimedCommand& b) { return a.at < b.at; });
   return script;

@@ -7,7 +7,7 @@ namespace wrenchd {
 namespace {
 
 /// One packet of a full-speed interrupt endpoint.
-constexpr std::size_t kMaxReportBytes = 64;
+constexpr std::size_t kMostBytes = 64;
 
 int digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -53,9 +53,9 @@ bool read_bytes(const TomlValue& value, std::vector<std::uint8_t>& out) {
                  "; write bytes as in \"04 00\"");
     return false;
   }
-  if (parsed.bytes.empty() || parsed.bytes.size() > kMaxReportBytes) {
+  if (parsed.bytes.empty() || parsed.bytes.size() > kMostBytes) {
     value.reject("has " + std::to_string(parsed.bytes.size()) + " bytes; a report has 1 to " +
-                 std::to_string(kMaxReportBytes));
+                 std::to_string(kMostBytes));
     return false;
   }
   out = parsed.bytes;

@@ -11,7 +11,7 @@ namespace {
 /// A step that fails each time logs the same error once in this time.
 constexpr auto kRepeatAfter = std::chrono::seconds(60);
 
-std::string reason() {
+std::string text_of_exception() {
   try {
     throw;
   } catch (const std::exception& error) {
@@ -25,7 +25,7 @@ std::string reason() {
 
 void ThreadGuard::log_exception() noexcept {
   try {
-    const std::string error = reason();
+    const std::string error = text_of_exception();
     const auto now = std::chrono::steady_clock::now();
     if (error == last_error_ && now - logged_at_ < kRepeatAfter) return;
     spdlog::error("{}: {}; the daemon continues without this step", thread_, error);

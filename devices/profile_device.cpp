@@ -78,7 +78,7 @@ void check_profile(const DeviceProfile& profile) {
   }
 }
 
-bool carries_pose(const PoseReportLayout& layout) noexcept {
+bool has_pose_fields(const PoseReportLayout& layout) noexcept {
   return layout.position.present || layout.orientation.present || layout.joints.present;
 }
 
@@ -97,7 +97,7 @@ void ProfileDevice::open() {
     const PoseReportLayout& report = *layout(i);
     if (report.device_time.present) device_time_field_ = &report.device_time;
     if (report.acknowledged.present) acknowledged_field_ = &report.acknowledged;
-    if (carries_pose(report)) pose_layouts_ |= std::uint64_t{1} << i;
+    if (has_pose_fields(report)) pose_layouts_ |= std::uint64_t{1} << i;
   }
   sample_ = {};
   state_ = {};

@@ -51,7 +51,7 @@ enum LocalTag : unsigned { kUsage = 0, kUsageMinimum = 1, kUsageMaximum = 2, kDe
 // Bits of an Input, Output or Feature item.
 constexpr std::uint32_t kConstantBit = 1, kVariableBit = 2, kRelativeBit = 4;
 
-std::string hex(std::uint64_t value, int digits = 2) {
+std::string hex_digits(std::uint64_t value, int digits = 2) {
   std::array<char, 24> text{};
   std::snprintf(text.data(), text.size(), "%0*llx", digits, static_cast<unsigned long long>(value));
   return text.data();
@@ -126,7 +126,7 @@ class DescriptorParser {
     Item item{next_, static_cast<ItemType>(bits >> 2 & 3), bits >> 4, kSizes[bits & 3], 0};
     if (prefix == kLongItem) reject(item, "is a long item; none is defined, and Linux accepts none");
     if (bytes_.size() - next_ - 1 < item.size)
-      reject(item, "item 0x" + hex(prefix) + " needs " + std::to_string(item.size) +
+      reject(item, "item 0x" + hex_digits(prefix) + " needs " + std::to_string(item.size) +
                        " more bytes, and the descriptor ends after " +
                        std::to_string(bytes_.size() - next_ - 1));
     for (unsigned i = 0; i < item.size; ++i)
@@ -258,7 +258,8 @@ class DescriptorParser {
     const Extent extent{item.as_signed(), item.data};
     switch (item.tag) {
       case kUsagePage:
-        if (item.data > 0xFFFF) reject(item, "usage page 0x" + hex(item.data) + " has more than 16 bits");
+        if (item.data > 0xFFFF)
+          reject(item, "usage page 0x" + hex_digits(item.data) + " has more than 16 bits");
         global_.usage_page = static_cast<std::uint16_t>(item.data);
         return;
       case kLogicalMinimum:
@@ -394,7 +395,7 @@ const char* name(ReportKind kind) noexcept {
 
 std::string to_text(Usage usage) {
   const std::string word = name_of(usage);
-  return hex(usage.page) + ":" + hex(usage.id) + (word.empty() ? "" : " (" + word + ")");
+  return hex_digits(usage.page) + ":" + hex_digits(usage.id) + (word.empty() ? "" : " (" + word + ")");
 }
 
 std::optional<Usage> DescribedField::usage(std::size_t i) const noexcept {

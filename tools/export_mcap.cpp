@@ -25,7 +25,7 @@ std::string schema_of(const std::string& title, const std::string& properties) {
   return R"({"title":")" + title + R"(","type":"object","properties":{)" + kTime + "," + properties + "}}";
 }
 
-std::string quoted(const std::string& text) {
+std::string json_text(const std::string& text) {
   return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -56,8 +56,8 @@ std::string tick_schema(const std::vector<RecordField>& fields) {
                                : field.type == FieldType::f64 ? R"("type":["number","null"])"
                                                               : R"("type":"integer")";
     properties += ",\"" + std::string(field.name) + "\":{\"description\":" +
-                  quoted(std::string(field.doc) + " [" + field.unit + "]" +
-                         (*field.frame != '\0' ? "; " + std::string(field.frame) : ""));
+                  json_text(std::string(field.doc) + " [" + field.unit + "]" +
+                            (*field.frame != '\0' ? "; " + std::string(field.frame) : ""));
     if (field.count == 1) {
       properties += "," + number + "}";
       continue;
@@ -151,7 +151,7 @@ class McapExport {
     if (markers_.empty()) return;
     std::string properties = R"("marker":)" + text;
     for (const std::string& name : markers_.conditions())
-      properties += "," + quoted(name) + R"(:{"type":["number","string","null"]})";
+      properties += "," + json_text(name) + R"(:{"type":["number","string","null"]})";
     conditions_ =
         writer_.add_channel("/conditions", "wrenchd.Conditions", schema_of("wrenchd.Conditions", properties));
   }
@@ -182,7 +182,7 @@ class McapExport {
     if (field.type == FieldType::u8)
       std::memcpy(&number, reinterpret_cast<const std::byte*>(&tick) + field.offset + component, 1);
     if (field.type == FieldType::u8 && !names.empty()) {
-      to += quoted(number < names.size() ? names[number] : std::to_string(number));
+      to += json_text(number < names.size() ? names[number] : std::to_string(number));
       return;
     }
     append_component(to, field, &tick, component);
@@ -232,13 +232,13 @@ class McapExport {
     constexpr int kLogInfo = 2;  // of foxglove.Log: 2 info, 3 warning, 4 error
     write(events_, event.time_ns,
           R"("level":)" + std::to_string(kLogInfo + static_cast<int>(event.severity)) + R"(,"message":)" +
-              quoted(event.text) + R"(,"name":)" + quoted(event.name) + R"(,"file":"","line":0)");
+              json_text(event.text) + R"(,"name":)" + json_text(event.name) + R"(,"file":"","line":0)");
   }
 
   void write_conditions(const MarkerColumns::Step& step) {
-    std::string members = R"("marker":)" + quoted(step.label);
+    std::string members = R"("marker":)" + json_text(step.label);
     for (std::size_t i = 0; i < step.values.size(); ++i)
-      members += "," + quoted(markers_.conditions()[i]) + ":" + step.values[i].dump();
+      members += "," + json_text(markers_.conditions()[i]) + ":" + step.values[i].dump();
     write(conditions_, step.time_ns, members);
   }
 

@@ -19,7 +19,7 @@ std::string heading(const RecordField& field) {
 }
 
 /// Returns a cell as RFC 4180 has it: in quotes if it contains a comma or a quote.
-std::string quoted(const std::string& text) {
+std::string csv_text(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string cell = "\"";
   for (const char c : text) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -42,7 +42,7 @@ void append_field(std::string& line, const RecordField& field, const std::vector
 
 void append_markers(std::string& line, const MarkerColumns& markers, std::int64_t now_ns) {
   const MarkerColumns::Step* const step = markers.at(now_ns);
-  line += "," + (step == nullptr ? std::string() : quoted(step->label));
+  line += "," + (step == nullptr ? std::string() : csv_text(step->label));
   for (std::size_t i = 0; i < markers.conditions().size(); ++i) {
     line += ',';
     if (step == nullptr || step->values[i].is_null()) continue;
@@ -50,7 +50,7 @@ void append_markers(std::string& line, const MarkerColumns& markers, std::int64_
       append_number(line, step->values[i].get<double>());
     else
       line +=
-          quoted(step->values[i].is_string() ? step->values[i].get<std::string>() : step->values[i].dump());
+          csv_text(step->values[i].is_string() ? step->values[i].get<std::string>() : step->values[i].dump());
   }
 }
 
@@ -67,7 +67,7 @@ void write_csv(std::ostream& out, const Recording& recording, const ExportSettin
   }
   if (!markers.empty()) {
     line += ",marker";
-    for (const std::string& name : markers.conditions()) line += "," + quoted(name);
+    for (const std::string& name : markers.conditions()) line += "," + csv_text(name);
   }
   out << line << '\n';
   for (const std::size_t row : selected_rows(recording, settings)) {

@@ -129,7 +129,7 @@ Json find_obstacle(const Json& scene, const std::string& name) {
                            (advice.empty() ? "; there are: " + (names.empty() ? "none" : names) : advice));
 }
 
-std::string quoted(const std::string& word) {
+std::string shell_word(const std::string& word) {
   return word.find_first_of(" []'\"$&;()") == std::string::npos ? word : "'" + word + "'";
 }
 
@@ -140,14 +140,14 @@ std::string pose_options(const Json& obstacle) {
 
 /// Returns the command that adds a removed obstacle again; empty: no command does.
 std::string command_to_add(const Json& obstacle) {
-  const std::string name = " --name " + quoted(obstacle["name"]);
+  const std::string name = " --name " + shell_word(obstacle["name"]);
   if (const auto plane = obstacle.find("half_space"); plane != obstacle.end())
     return "wrenchctl scene add half_space" + name + " --normal " + exact_text((*plane)["normal"]) +
            " --offset " + to_text((*plane)["offset"].get<double>());
   const auto mesh = obstacle["mesh"].get<std::string>();
   std::error_code ignored;
   if (!fs::is_regular_file(mesh, ignored) || obstacle["moves"] == true) return {};
-  return "wrenchctl scene add " + quoted(mesh) + name + " --kind " + obstacle["kind"].get<std::string>() +
+  return "wrenchctl scene add " + shell_word(mesh) + name + " --kind " + obstacle["kind"].get<std::string>() +
          " --scale " + to_text(obstacle["scale"].get<double>()) + pose_options(obstacle);
 }
 
@@ -158,7 +158,7 @@ void load(Client& client, const std::string& file, const ControlOptions& options
   const Json now = call(client, "scene.get");
   print(fmt::format("scene: {} -> {}, {} obstacles\n", before["file"].get<std::string>(),
                     now["file"].get<std::string>(), now["obstacles"].size()));
-  if (before["file"] != now["file"]) print("undo: wrenchctl scene load " + quoted(before["file"]) + "\n");
+  if (before["file"] != now["file"]) print("undo: wrenchctl scene load " + shell_word(before["file"]) + "\n");
 }
 
 /// A file in the working directory, else a name that the daemon searches; "peg" is scenes/peg.toml there.
@@ -240,7 +240,7 @@ void run_scene_add(const SceneEdit& edit, const ControlOptions& options) {
   const Json result = call(client, "scene.add", {{"obstacle", obstacle}});
   if (options.json) return print(pretty(result));
   const auto name = result["name"].get<std::string>();
-  print("added " + name + "\nundo: wrenchctl scene remove " + quoted(name) + "\n");
+  print("added " + name + "\nundo: wrenchctl scene remove " + shell_word(name) + "\n");
 }
 
 /// What the user does not state stays as it is: position or rotation.
@@ -265,7 +265,7 @@ void run_scene_move(const SceneEdit& edit, const ControlOptions& options) {
                     vector_text(before["position_m"]), vector_text(request["position_m"]),
                     vector_text(before["rotation_vector_rad"]), vector_text(request["rotation_vector_rad"]),
                     edit.duration_s));
-  print("undo: wrenchctl scene move " + quoted(edit.subject) + pose_options(before) + "\n");
+  print("undo: wrenchctl scene move " + shell_word(edit.subject) + pose_options(before) + "\n");
 }
 
 void run_scene_remove(const SceneEdit& edit, const ControlOptions& options) {

@@ -120,7 +120,7 @@ std::string variables(const Recording& recording, const std::string& terminal, c
   return text;
 }
 
-std::string to_printable(const std::string& text) {
+std::string gnuplot_title(const std::string& text) {
   std::string good;
   for (const char c : text)
     if (c != '\'' && c != '\\' && static_cast<unsigned char>(c) >= ' ') good += c;
@@ -161,7 +161,7 @@ class TemporaryDirectory {
 std::vector<fs::path> plot_recording(const Recording& recording, const fs::path& output) {
   if (recording.ticks.empty())
     throw std::runtime_error("the recording has no ticks; record again while the loop runs");
-  const std::string title = to_printable(recording.header.scene_file.stem().string());
+  const std::string title = gnuplot_title(recording.header.scene_file.stem().string());
   const std::string kind = output.extension().string();
   if (kind == ".svg" || kind == ".pdf" || kind == ".png") {
     const TemporaryDirectory directory;

@@ -12,14 +12,13 @@
 #include "config/toml_file.hpp"
 #include "devices/layout_check.hpp"
 #include "devices/profile_reports.hpp"
+#include "devices/report_frame.hpp"
 #include "devices/six_axes.hpp"
 
 namespace wrenchd {
 namespace {
 
-// Maximum length of a report in a profile. config/load_report_layout.cpp and config/load_profile.cpp reject
-// longer ones.
-constexpr std::size_t kMaxReportBytes = 64;
+// config/load_profile.cpp rejects more.
 constexpr std::size_t kMostButtons = 32;
 constexpr double kLeastStep = 1e-12, kLargestStep = 1e3;
 constexpr double kLargestOffset = 1e6;

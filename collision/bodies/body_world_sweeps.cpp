@@ -12,7 +12,7 @@ namespace {
 constexpr double kBehind = 0.1;
 /// If a sweep finds an overlap but no contact, the contacts with a gap below this multiple of the clearance
 /// at the start are added.
-constexpr double kNear = 4.0;
+constexpr double kNearby = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
@@ -95,7 +95,7 @@ bool BodyWorld::add_touching(BodyPair& pair) noexcept {
   const auto start_of = [&](std::size_t i) {
     return i == BodyContact::kFixed ? BodyPath{} : BodyPath{bodies_[i].motion.X_WB, bodies_[i].motion.X_WB};
   };
-  pair.sweep(start_of(pair.a()), start_of(pair.b()), kNear * kClearance_m, budget_, {time_s_, time_s_});
+  pair.sweep(start_of(pair.a()), start_of(pair.b()), kNearby * kClearance_m, budget_, {time_s_, time_s_});
   bool found_new = false;
   for (const Contact& contact : pair.touching()) found_new = add_contact(pair, contact) || found_new;
   return found_new;

@@ -89,7 +89,7 @@ std::string contact_surface_text(std::size_t used, std::size_t triangles, double
 
 std::string with_thousands_separators(std::size_t number) {
   std::string text = std::to_string(number);
-  for (std::size_t at = text.size(); at > 3; at -= 3) text.insert(at - 3, ",");
+  for (std::size_t at = text.size(); at > 3; at -= 3) text.insert(at - 3, 1, ',');
   return text;
 }
 

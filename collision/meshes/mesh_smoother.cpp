@@ -149,8 +149,8 @@ class MeshSmoother {
 
   /// Finds two neighbours of each vertex along creases, and counts them.
   void find_crease_neighbours() {
-    constexpr Index kNone = ~Index{0};
-    creases_.assign(mesh_.vertices_m.size(), {kNone, kNone, 0});
+    constexpr Index kNoOther = ~Index{0};
+    creases_.assign(mesh_.vertices_m.size(), {kNoOther, kNoOther, 0});
     for (const Edge& edge : edges_) {
       if (edge.smooth) continue;
       for (const auto& [v, other] : {std::pair(edge.a, edge.b), std::pair(edge.b, edge.a)}) {

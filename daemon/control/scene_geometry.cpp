@@ -34,11 +34,7 @@ void write(const TriangleMesh& mesh, std::byte* vertices, std::byte* triangles) 
   if (!mesh.triangles.empty()) std::memcpy(triangles, mesh.triangles.data(), 12 * mesh.triangles.size());
 }
 
-Json json_of(const Vector3d& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
-Json json_of(const ObstacleMotion& motion) {
+Json motion_json(const ObstacleMotion& motion) {
   return {{"linear_m_per_s", json_of(motion.linear_m_per_s)},
           {"angular_rad_per_s", json_of(motion.angular_rad_per_s)},
           {"reverse_after_s", motion.reverse_after_s},
@@ -51,6 +47,10 @@ bool same(const TriangleMesh& a, const TriangleMesh& b) {
 }
 
 }  // namespace
+
+Json json_of(const Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
 
 Json view_json(const ViewSettings& view) {
   if (view.eye_m == view.target_m) return nullptr;
@@ -140,11 +140,11 @@ Json SceneGeometry::description(const Scene& scene) const {
     Json obstacle = {{"name", obstacle_name(scene, number++)},
                      {"mesh", mesh_number(one.mesh.get())},
                      {"X_WO", pose_json(one.X_WO)}};
-    if (one.motion.moves()) obstacle["motion"] = json_of(one.motion);
+    if (one.motion.moves()) obstacle["motion"] = motion_json(one.motion);
     if (one.scheduled)
       obstacle["scheduled"] = {{"start_s", one.scheduled->start_s},
                                {"X_WO", pose_json(one.scheduled->X_WO)},
-                               {"motion", json_of(one.scheduled->motion)}};
+                               {"motion", motion_json(one.scheduled->motion)}};
     obstacles.push_back(std::move(obstacle));
   }
   Json bodies = Json::array();

@@ -56,4 +56,7 @@ Json view_json(const ViewSettings& view);
 /// Returns a pose as in tick records: x y z [m], qx qy qz qw. Not RT-safe: allocates.
 Json pose_json(const Pose& X);
 
+/// [x, y, z]. Not RT-safe: allocates.
+Json json_of(const Vector3d& v);
+
 }  // namespace wrenchd

@@ -22,10 +22,6 @@ double number_or(const Json& params, const char* name, double otherwise) {
   return found == params.end() ? otherwise : found->get<double>();
 }
 
-Json json_of(const Vector3d& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
 /// Returns true if the caller may name files outside of the directories for clients, and read in errors what
 /// files contain.
 bool may_read_files(const Caller& caller) {
@@ -98,7 +94,7 @@ class GeometryCache {
   std::uint64_t geometry_id_ = 0;
 };
 
-Json json_of(const RenderingValue::Value& value) {
+Json value_json(const RenderingValue::Value& value) {
   if (const auto* number = std::get_if<double>(&value)) return *number;
   if (const auto* word = std::get_if<std::string>(&value)) return *word;
   Json rows = Json::array();
@@ -112,7 +108,7 @@ Json rendering_json(const Reconfigurator& reconfigurator) {
   Json values = Json::array();
   for (const RenderingValue& value : rendering_values()) {
     Json row = {{"name", value.name},
-                {"value", json_of(value.read(settings))},
+                {"value", value_json(value.read(settings))},
                 {"unit", value.unit()},
                 {"expected", expected_text(value)}};
     if (const std::vector<std::string> words = accepted_words(value); !words.empty()) row["words"] = words;
@@ -127,8 +123,8 @@ Json changed_json(const std::vector<ChangedValue>& changed) {
   for (const ChangedValue& one : changed)
     values.push_back({{"name", one.value->name},
                       {"unit", one.value->unit()},
-                      {"before", json_of(one.before)},
-                      {"now", json_of(one.now)}});
+                      {"before", value_json(one.before)},
+                      {"now", value_json(one.now)}});
   return values;
 }
 

@@ -14,8 +14,8 @@
 namespace wrenchd {
 namespace {
 
-constexpr double kMinExpiry_s = 0.005;
-constexpr double kDefaultExpiry_s = 0.1;
+constexpr double kMinWrenchExpiry_s = 0.005;
+constexpr double kDefaultWrenchExpiry_s = 0.1;
 
 /// The program whose wrench acts. Another one must wait until it has expired.
 struct Source {
@@ -39,11 +39,11 @@ ExternalWrenchRequest request_of(const Json& params, const LimitSettings& limits
         fmt::format("'energy_J' must be 0 to {}; declare the energy that the wrench gives to the hand "
                     "until the next call.",
                     WorkAccount::kMaxBalance_J));
-  const double expires_s = params.value("expires_s", kDefaultExpiry_s);
-  if (expires_s < kMinExpiry_s || expires_s > ExternalWrenchRequest::kMaxLifetime_s)
+  const double expires_s = params.value("expires_s", kDefaultWrenchExpiry_s);
+  if (expires_s < kMinWrenchExpiry_s || expires_s > ExternalWrenchRequest::kMaxLifetime_s)
     throw RpcError(RpcCode::invalid_params,
                    fmt::format("'expires_s' must be {} to {}; set the wrench again before it expires.",
-                               kMinExpiry_s, ExternalWrenchRequest::kMaxLifetime_s));
+                               kMinWrenchExpiry_s, ExternalWrenchRequest::kMaxLifetime_s));
   request.expires = now + from_seconds(expires_s);
   return request;
 }

@@ -16,10 +16,10 @@ static_assert(std::is_same_v<hid_t, std::int64_t> && std::is_same_v<herr_t, int>
 
 constexpr const char* kPath = "/events";
 constexpr hsize_t kChunkRows = 32;
-constexpr unsigned kDeflateLevel = 1;
+constexpr unsigned kEventDeflateLevel = 1;
 
 /// A row of /events. A text ends at its first zero byte or at its last byte.
-struct EventRow {
+struct StoredEvent {
   std::int64_t time_ns = 0;
   std::int64_t tick = 0;
   double value = 0.0;
@@ -28,7 +28,7 @@ struct EventRow {
   std::array<char, RecordedEvent::kTextBytes> text{};
   std::array<char, RecordedEvent::kConditionsBytes> conditions{};
 };
-static_assert(std::is_trivially_copyable_v<EventRow>);
+static_assert(std::is_trivially_copyable_v<StoredEvent>);
 
 constexpr std::array<EventColumn, 7> kColumns = {{
     {"time_ns", "i64", "ns", "time of the event, on the clock of now_ns", ""},
@@ -54,17 +54,17 @@ hid_t text_member(std::size_t bytes) {
 }
 
 hid_t row_type() {
-  const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(EventRow));
-  H5Tinsert(row, "time_ns", offsetof(EventRow, time_ns), H5T_NATIVE_INT64);
-  H5Tinsert(row, "tick", offsetof(EventRow, tick), H5T_NATIVE_INT64);
-  H5Tinsert(row, "severity", offsetof(EventRow, severity), H5T_NATIVE_UINT8);
+  const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(StoredEvent));
+  H5Tinsert(row, "time_ns", offsetof(StoredEvent, time_ns), H5T_NATIVE_INT64);
+  H5Tinsert(row, "tick", offsetof(StoredEvent, tick), H5T_NATIVE_INT64);
+  H5Tinsert(row, "severity", offsetof(StoredEvent, severity), H5T_NATIVE_UINT8);
   const H5Handle name(text_member(RecordedEvent::kNameBytes), H5Tclose);
-  H5Tinsert(row, "name", offsetof(EventRow, name), name);
+  H5Tinsert(row, "name", offsetof(StoredEvent, name), name);
   const H5Handle text(text_member(RecordedEvent::kTextBytes), H5Tclose);
-  H5Tinsert(row, "text", offsetof(EventRow, text), text);
-  H5Tinsert(row, "value", offsetof(EventRow, value), H5T_NATIVE_DOUBLE);
+  H5Tinsert(row, "text", offsetof(StoredEvent, text), text);
+  H5Tinsert(row, "value", offsetof(StoredEvent, value), H5T_NATIVE_DOUBLE);
   const H5Handle conditions(text_member(RecordedEvent::kConditionsBytes), H5Tclose);
-  H5Tinsert(row, "conditions", offsetof(EventRow, conditions), conditions);
+  H5Tinsert(row, "conditions", offsetof(StoredEvent, conditions), conditions);
   return row;
 }
 
@@ -73,7 +73,7 @@ hid_t create_set(hid_t file, hid_t row) {
   const H5Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
   const H5Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_chunk(layout, 1, &kChunkRows);
-  H5Pset_deflate(layout, kDeflateLevel);
+  H5Pset_deflate(layout, kEventDeflateLevel);
   return H5Dcreate2(file, kPath, row, space, H5P_DEFAULT, layout, H5P_DEFAULT);
 }
 
@@ -88,8 +88,8 @@ std::string get(const std::array<char, N>& from) {
   return std::string(from.begin(), std::find(from.begin(), from.end(), '\0'));
 }
 
-EventRow to_row(const RecordedEvent& event) {
-  EventRow row;
+StoredEvent to_row(const RecordedEvent& event) {
+  StoredEvent row;
   std::memset(static_cast<void*>(&row), 0, sizeof row);  // padding too: equal events have equal bytes
   row.time_ns = event.time_ns;
   row.tick = event.tick;
@@ -102,7 +102,7 @@ EventRow to_row(const RecordedEvent& event) {
   return row;
 }
 
-RecordedEvent from_row(const EventRow& row) {
+RecordedEvent from_row(const StoredEvent& row) {
   constexpr auto kHighest = static_cast<std::uint8_t>(EventLevel::error);
   return {row.time_ns,        row.tick,      static_cast<EventLevel>(std::min(row.severity, kHighest)),
           get(row.name),      get(row.text), row.value,
@@ -123,14 +123,14 @@ std::span<const EventColumn> event_columns() noexcept {
 }
 
 std::size_t event_row_bytes() noexcept {
-  return sizeof(EventRow);
+  return sizeof(StoredEvent);
 }
 
 EventTable::EventTable(hid_t file) : row_(row_type(), H5Tclose), set_(create_set(file, row_), H5Dclose) {}
 
 bool EventTable::append(std::span<const RecordedEvent> events) {
   if (events.empty()) return true;
-  std::vector<EventRow> rows;
+  std::vector<StoredEvent> rows;
   rows.reserve(events.size());
   for (const RecordedEvent& event : events) rows.push_back(to_row(event));
   const hsize_t start = rows_, count = rows.size(), total = start + count;
@@ -146,7 +146,7 @@ bool EventTable::append(std::span<const RecordedEvent> events) {
 EventsRead read_events(hid_t set, std::uint64_t most_rows) {
   const H5Handle stored(H5Dget_type(set), H5Tclose);
   if (H5Tget_class(stored) != H5T_COMPOUND) return {{}, "has no columns; name a recording of wrenchd"};
-  if (H5Tget_size(stored) > 4 * sizeof(EventRow))
+  if (H5Tget_size(stored) > 4 * sizeof(StoredEvent))
     return {{}, "has longer rows than a recording; the file is damaged"};
   for (const EventColumn& column : kColumns) {
     const int member = H5Tget_member_index(stored, column.name);
@@ -161,14 +161,14 @@ EventsRead read_events(hid_t set, std::uint64_t most_rows) {
   if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &count, nullptr) != 1)
     return {{}, "is not one-dimensional; the file is damaged"};
   if (count > most_rows) return {{}, "cannot have as many rows as its header states; the file is damaged"};
-  std::vector<EventRow> rows(count);
+  std::vector<StoredEvent> rows(count);
   const H5Handle row(row_type(), H5Tclose);
   if (count > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0)
     return {{}, "cannot be read; the file is damaged or truncated"};
   while (!rows.empty() && rows.back().name[0] == '\0') rows.pop_back();
   EventsRead read;
   read.events.reserve(rows.size());
-  for (const EventRow& one : rows) read.events.push_back(from_row(one));
+  for (const StoredEvent& one : rows) read.events.push_back(from_row(one));
   return read;
 }
 

@@ -8,7 +8,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr auto kResponseTimeout = std::chrono::seconds(2);
+constexpr auto kHandTimeout = std::chrono::seconds(2);
 
 std::array<double, 3> numbers(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
@@ -49,7 +49,7 @@ void PageHand::run(const std::stop_token& stop) {
 
 void PageHand::send(const Goal& goal) {
   try {
-    if (!client_) client_.emplace(socket_, kResponseTimeout);
+    if (!client_) client_.emplace(socket_, kHandTimeout);
     client_->move_hand(numbers(goal.X_BG.translation_m), numbers(rotation_vector(goal.X_BG.rotation)),
                        kExpires);
   } catch (const ClientError& error) {

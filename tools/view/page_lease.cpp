@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kHeartbeatInterval = 25ms;  ///< heartbeat interval; the daemon's timeout is 100 ms
-constexpr auto kResponseTimeout = 2s;      ///< response timeout; after it the lease is lost anyway
+constexpr auto kLeaseTimeout = 2s;         ///< response timeout; after it the lease is lost anyway
 constexpr int kFadeChecks = 20;            ///< in heartbeat intervals; a fade takes 100 ms
 constexpr auto kArmedDelay = 500ms;        ///< time until the ticks show the new state
 
@@ -84,7 +84,7 @@ void PageLease::set_loop_state(const std::string& state) {
 }
 
 Client& PageLease::client() {
-  if (!client_) client_.emplace(socket_, kResponseTimeout);
+  if (!client_) client_.emplace(socket_, kLeaseTimeout);
   return *client_;
 }
 
@@ -200,7 +200,7 @@ void PageLease::run_stops(const std::stop_token& stop) {
     }
     Reply reply{page, name(Request::stop), true, {}};
     try {
-      Client(socket_, kResponseTimeout).stop();
+      Client(socket_, kLeaseTimeout).stop();
     } catch (const ClientError& error) {
       reply.accepted = false;
       reply.error = error.what();

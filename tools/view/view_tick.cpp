@@ -22,10 +22,6 @@ double length(double x, double y, double z) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
-Json json_of(const Vector3d& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
 /// Returns null for NaN and infinity, which JSON lacks.
 Json number(double x) {
   return std::isfinite(x) ? Json(x) : Json(nullptr);
