@@ -86,6 +86,10 @@ std::string status_text(const Json& s) {
   if (const Json& cause = s["cause"]; cause.is_object())
     text += fmt::format("cause      {}: {}\nremedy     {}\n", cause["name"].get<std::string>(),
                         cause["message"].get<std::string>(), cause["cure"].get<std::string>());
+  if (const auto before = s.find("before_cause"); before != s.end())
+    for (const Json& fault : *before)
+      text += fmt::format("before it  {}: {}\n           {}\n", fault["name"].get<std::string>(),
+                          fault["message"].get<std::string>(), fault["cure"].get<std::string>());
   if (const auto no_force = s.find("no_force");
       no_force != s.end() && no_force->is_string() && !s["cause"].is_object())
     text += fmt::format("no force   {}\n", no_force->get<std::string>());

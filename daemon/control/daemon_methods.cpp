@@ -49,6 +49,13 @@ Json last_fault_json(const FeedSnapshot& now) {
   return fault;
 }
 
+/// The faults shortly before the cause, the newest first.
+Json before_cause_json(const FeedSnapshot& now) {
+  Json faults = Json::array();
+  for (const Fault fault : now.before_cause) faults.push_back(fault_json(fault));
+  return faults;
+}
+
 /// Why there is no force now, as text; null in states with force.
 Json no_force_json(const DaemonContext& context, const FeedSnapshot& now) {
   const WaitReason reason = context.runtime.loop().telemetry().wait_reason();
@@ -64,6 +71,7 @@ Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
   return {{"sequence", now.sequence},
           {"state", name(now.state)},
           {"cause", fault_json(now.cause)},
+          {"before_cause", before_cause_json(now)},
           {"no_force", no_force_json(context, now)},
           {"last_fault", last_fault_json(now)},
           {"armed_by", armed_by},
@@ -196,8 +204,8 @@ void add_status_methods(MethodTable& table, const DaemonContext& context) {
       MethodRow{"status",
                 Role::observer,
                 {},
-                "Returns state and cause, device, limits, lease, and tick times. The result includes all "
-                "events up to number 'sequence'.",
+                "Returns state and cause, the faults of the ten seconds before the cause, device, limits, "
+                "lease, and tick times. The result includes all events up to number 'sequence'.",
                 [context](const Json&, const Caller&) { return MethodResult(status_json(context)); }});
   table.add(MethodRow{"devices",
                       Role::observer,

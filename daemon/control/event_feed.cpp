@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/control/event_feed.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <utility>
@@ -29,6 +30,11 @@ spdlog::level::level_enum log_level(EventLevel level) {
   }
   return spdlog::level::err;
 }
+
+/// Faults that the feed remembers, and which of them it names as before a cause: those of this time, and this
+/// number of them.
+constexpr std::size_t kRecentFaults = 16, kMostBefore = 3;
+constexpr std::chrono::seconds kBefore{10};
 
 /// Applies an event to what clients know of the loop.
 void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& description) {
@@ -150,6 +156,11 @@ void EventFeed::set_fault_recorder(RecordFault recorded_in) {
 void EventFeed::publish(const Event& event) {
   EventDescription description = describe(event);
   if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data)) {
+    {
+      const std::scoped_lock lock(mutex_);
+      recent_faults_.emplace_front(event.at, raised->fault);
+      if (recent_faults_.size() > kRecentFaults) recent_faults_.pop_back();
+    }
     if (!raised->changed_state) {
       const auto repeats = fault_repeats_.admit(raised->fault, event.at);
       if (!repeats) return;
@@ -170,9 +181,22 @@ void EventFeed::publish(const Event& event) {
     append_held_back_faults(event.at, Source::loop);
   const State from = snapshot_.state;
   apply(snapshot_, event, description);
+  if (std::holds_alternative<Event::StateChanged>(event.data))
+    snapshot_.before_cause = faults_before(snapshot_.cause, event.at);
   append(event.at, description.name, description.level, description.text, description.fields);
   if (const auto* state = std::get_if<Event::StateChanged>(&event.data))
     append_device_event(event.at, from, state->state);
+}
+
+/// Returns FeedSnapshot::before_cause. Precondition: mutex_ is locked.
+std::vector<Fault> EventFeed::faults_before(Fault cause, TimePoint at) const {
+  std::vector<Fault> before;
+  if (cause == Fault::none) return before;
+  for (const auto& [raised_at, fault] : recent_faults_) {
+    const bool known = fault == cause || std::find(before.begin(), before.end(), fault) != before.end();
+    if (!known && at - raised_at <= kBefore && before.size() < kMostBefore) before.push_back(fault);
+  }
+  return before;
 }
 
 /// Publishes how often faults were raised that changed no state. Precondition: drain_mutex_ and mutex_ are

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/fault.hpp"
@@ -37,6 +38,8 @@ struct FeedSnapshot {
   Fault cause = Fault::none;
   Fault last_fault = Fault::none;  ///< newest fault that changed the state; none: there was no such fault
   TimePoint last_fault_at{};       ///< when last_fault was raised
+  /// Other faults of the ten seconds before the cause, the newest first, at most three: often its reason.
+  std::vector<Fault> before_cause;
   std::string proxy_initialization = "unknown";  ///< "searching", "found" or "failed"
   std::uint32_t held_body = 0;                   ///< number of the body that the tool holds, from 1; 0: none
   double stiffness_scale = 1.0;                  ///< stable fraction of the configured stiffness, 0 to 1
@@ -108,6 +111,7 @@ class EventFeed {
   enum class Source : std::uint8_t { loop, other };
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
               const Json& fields, Source source = Source::loop);
+  std::vector<Fault> faults_before(Fault cause, TimePoint at) const;
   void append_held_back_faults(TimePoint at, Source source);
   void append_device_event(TimePoint at, State from, State to);
 
@@ -120,9 +124,10 @@ class EventFeed {
   FaultRepeats fault_repeats_;                   ///< protected by drain_mutex_
   ThreadGuard record_guard_{"flight recorder"};  ///< protected by drain_mutex_
 
-  mutable std::mutex mutex_;       ///< protects history_, snapshot_ and wake_fd_
+  mutable std::mutex mutex_;       ///< protects the members until wake_fd_
   std::deque<FeedEvent> history_;  ///< the last event has the number snapshot_.sequence
   FeedSnapshot snapshot_;
+  std::deque<std::pair<TimePoint, Fault>> recent_faults_;  ///< also those that changed no state
   int wake_fd_ = -1;
 
   std::jthread thread_;  ///< last member: it uses the members above

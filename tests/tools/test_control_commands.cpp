@@ -6,6 +6,7 @@
 #include "daemon/control/json_rpc.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
+#include "tools/control_commands.hpp"
 
 // wrenchctl and the daemon as two processes.
 
@@ -170,6 +171,9 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   CHECK(stop.exit_code == 0);
   has(stop.out, "requested: stop; state stopped");
   has(daemon.ctl({"status"}).out, "cause      stop_requested: ");
+  Json status = Json::parse(daemon.ctl({"status", "--json"}).out);
+  status["before_cause"] = {{{"name", "motors_off"}, {"message", "off"}, {"cure", "switch them on"}}};
+  has(status_text(status), "\nbefore it  motors_off: off\n           switch them on\n");
   const ProgramResult arm = daemon.ctl({"arm"});
   CHECK(arm.exit_code == 1);
   has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge the fault or stop first.");

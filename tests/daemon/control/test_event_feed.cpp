@@ -8,6 +8,7 @@ namespace wrenchd {
 namespace {
 
 using namespace test;
+using namespace std::chrono_literals;
 
 std::vector<Json> events_of(const EventFeed& feed, std::uint64_t next,
                             const std::set<std::string>& names = {}) {
@@ -164,6 +165,26 @@ TEST_CASE("the snapshot has the newest fault that changed the state, and its tim
   CHECK(feed.snapshot().state == State::disarmed);
   CHECK(feed.snapshot().last_fault == Fault::stop_requested);
   CHECK(feed.snapshot().last_fault_at == stopped_at);
+}
+
+TEST_CASE("the snapshot names the faults of the ten seconds before the cause", "[event_feed]") {
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
+  s.run(0.05);
+  feed.drain();
+  const TimePoint now = s.clock.now();
+  EventQueue& events = s.runtime.loop().telemetry().events();
+  events.emit(now - 11s, Event::FaultRaised{Fault::tick_late, 0.0, false});
+  events.emit(now - 2s, Event::FaultRaised{Fault::report_malformed, 0.0, false});
+  events.emit(now - 1s, Event::FaultRaised{Fault::watchdog_tripped, 0.0});
+  events.emit(now - 1s, Event::FaultRaised{Fault::report_malformed, 0.0, false});
+  events.emit(now, Event::FaultRaised{Fault::degraded_too_long, 0.0});
+  events.emit(now, Event::StateChanged{State::fault, Fault::degraded_too_long});
+  feed.drain();
+  CHECK(feed.snapshot().before_cause == std::vector{Fault::report_malformed, Fault::watchdog_tripped});
+  events.emit(now, Event::StateChanged{State::disarmed, Fault::none});
+  feed.drain();
+  CHECK(feed.snapshot().before_cause.empty());
 }
 
 TEST_CASE("an error of the flight recorder does not end the feed, and the fault is published",

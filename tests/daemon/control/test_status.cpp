@@ -84,6 +84,16 @@ TEST_CASE("the status names the body that the tool holds", "[status]") {
   CHECK(r.status()["scene"]["held_body"].is_null());
 }
 
+TEST_CASE("the status names the faults before the cause", "[status]") {
+  Rig r;
+  const TimePoint now = r.s.clock.now();
+  r.s.runtime.loop().telemetry().events().emit(now, Event::FaultRaised{Fault::watchdog_tripped, 0.0});
+  r.s.runtime.loop().telemetry().events().emit(now,
+                                               Event::StateChanged{State::fault, Fault::degraded_too_long});
+  REQUIRE(r.status()["before_cause"].size() == 1);
+  CHECK(r.status()["before_cause"][0]["name"] == "watchdog_tripped");
+}
+
 TEST_CASE("the status has the last fault with the time of its tick", "[status]") {
   Rig r;
   CHECK(r.status()["last_fault"].is_null());

@@ -117,7 +117,9 @@ function showCause(now) {
     const known = faults[cause] ?? link?.status?.cause ?? { message: "", cure: "" };
     const stopped = now.state === "stopped";
     const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
-    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.message), cure);
+    const before = mode === "live" && link?.status?.before_cause?.[0];
+    const message = sentence(known.message) + (before ? ` Before it: ${sentence(`${before.message}: ${before.cure}`)}` : "");
+    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, message, cure);
   }
   // The daemon says when the fault was raised, on the clock of the ticks. The page may have been opened later.
   if (mode === "live") {
