@@ -51,15 +51,18 @@ test(async () => {
     assert.ok(x > canvas.x && x < canvas.x + canvas.width && y > canvas.y && y < canvas.y + canvas.height, `key ${key}: the tool is at ${x}, ${y}`);
   }
 
-  // The length of the scale is the distance on the screen between two points of the world that are so far apart at the target.
-  const scale = await page.evaluate(() => window.view.scale());
-  const line = await page.locator("#scale-line").boundingBox();
-  const apart = await page.evaluate((length_m) => {  // seen along +y, +x is to the right
-    const { target } = window.view.world();
-    const [left, right] = [-0.5, 0.5].map((half) => window.view.onScreen([target[0] + half * length_m, target[1], target[2]]));
-    return right[0] - left[0];
-  }, scale.length_m);
-  assert.ok(Math.abs(line.width - apart) < 2 && line.width > 30 && line.width < 120, `${line.width} px, ${apart} px`);
+  // The length of the scale is the distance on the screen between two points of the world that are so far apart at the target. The
+  // scale follows the camera a frame later.
+  await until("the scale has its length", async () => {
+    const scale = await page.evaluate(() => window.view.scale());
+    const line = await page.locator("#scale-line").boundingBox();
+    const apart = await page.evaluate((length_m) => {  // seen along +y, +x is to the right
+      const { target } = window.view.world();
+      const [left, right] = [-0.5, 0.5].map((half) => window.view.onScreen([target[0] + half * length_m, target[1], target[2]]));
+      return right[0] - left[0];
+    }, scale.length_m);
+    return Math.abs(line.width - apart) < 2 && line.width > 30 && line.width < 120;
+  }, 10000);
   assert.match(await page.locator("#scale-text").textContent(), /^[\d.]+ (m|mm|um); force arrows [\d.]+ N$/);
 
   // The camera follows the tool of a hand that moves, at a constant distance.
