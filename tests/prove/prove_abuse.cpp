@@ -255,15 +255,15 @@ class Signalled {
         daemon_(program, {"--realtime", "off", "--arm", "--control", socket_},
                 directory / ("signal-" + std::to_string(signal) + ".log")) {}
 
-  /// Waits for force, and sends the signal. Returns false if the loop is not armed in time: a busy machine
-  /// raises faults.
+  /// Waits for force, and sends the signal. Returns false if the loop is not armed in time, or has latched a
+  /// fault, as on a busy machine.
   bool send() try {
     const auto end = std::chrono::steady_clock::now() + 20s;
     while (!connected(socket_) && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(5ms);
     client_.emplace(socket_);
     reader_.emplace(client_->open_state());
     while (client_->state() != "active") {
-      if (std::chrono::steady_clock::now() > end) return false;
+      if (client_->state() == "fault" || std::chrono::steady_clock::now() > end) return false;
       std::this_thread::sleep_for(5ms);
     }
     daemon_.signal(signal_);
