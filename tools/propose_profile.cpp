@@ -18,7 +18,7 @@
 namespace wrenchd {
 namespace {
 
-// config/load_profile.cpp rejects more.
+// A profile has at most this number of buttons; config/load_profile.cpp rejects more.
 constexpr std::size_t kMostButtons = 32;
 constexpr double kLeastStep = 1e-12, kLargestStep = 1e3;
 constexpr double kLargestOffset = 1e6;

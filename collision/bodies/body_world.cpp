@@ -450,9 +450,7 @@ void BodyWorld::apply_impulses(std::size_t tool_of_step) noexcept {
     const auto push = [&](std::size_t i, double sign) {
       if (i == BodyContact::kFixed || is_tool(i) || is_held(i)) return;
       Body& body = bodies_[i];
-      const Vector3d impulse = sign * body.step_s * c.force_W_N;
-      body.free.velocity_W_m_per_s += impulse / body.M.mass_kg;
-      body.free.spin_W += (at.point_W_m - acting_pose(i).translation_m).cross(impulse);
+      add_impulse(i, sign * body.step_s * c.force_W_N, at.point_W_m, body.free);
     };
     push(c.a, 1.0);
     push(c.b, -1.0);
@@ -462,6 +460,13 @@ void BodyWorld::apply_impulses(std::size_t tool_of_step) noexcept {
     body.free.X_WB = body.X_WQ;
     body.motion = body.free;
   }
+}
+
+/// Adds an impulse at a point to a motion of a body, METHOD (109).
+void BodyWorld::add_impulse(std::size_t i, const Vector3d& impulse_W_Ns, const Vector3d& point_W_m,
+                            BodyMotion& motion) const noexcept {
+  motion.velocity_W_m_per_s += impulse_W_Ns / bodies_[i].M.mass_kg;
+  motion.spin_W += (point_W_m - acting_pose(i).translation_m).cross(impulse_W_Ns);
 }
 
 /// The work on a tool adds up over the steps of the other hand, and the next step of its own hand completes

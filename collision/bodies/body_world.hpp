@@ -203,15 +203,17 @@ class BodyWorld {
 
   /// A contact of an impact, METHOD (117).
   struct ImpactContact {
-    std::size_t contact = 0;
-    double rebound_m_per_s = 0.0;  ///< normal velocity after it, e u
-    Vector3d plastic_W_N = Vector3d::Zero(), elastic_W_N = Vector3d::Zero();  ///< forces on body a
+    std::size_t contact = 0;       ///< its place in contacts_
+    double rebound_m_per_s = 0.0;  ///< least normal velocity after the impact, e u
+    /// Forces on body a without and with restitution.
+    Vector3d plastic_W_N = Vector3d::Zero(), elastic_W_N = Vector3d::Zero();
   };
   /// The bodies of an island in an impact.
   struct Impact {
     double step_s = 0.0;  ///< time that passes for the island in the step
     std::vector<ImpactContact> contacts;
-    std::vector<BodyMotion> before, after;  ///< of each body of the world
+    /// Motion of each body of the world just before the impact, and after it.
+    std::vector<BodyMotion> before, after;
   };
 
   void begin(const std::optional<Hand>& hand, std::size_t tool) noexcept;
@@ -283,6 +285,8 @@ class BodyWorld {
   double time_of_impact_s(const BodyContact& contact, double approach_m_per_s) const noexcept;
   bool solve_impact(bool elastic) noexcept;
   double energy_rise_J(double share) noexcept;
+  void add_impulse(std::size_t body, const Vector3d& impulse_W_Ns, const Vector3d& point_W_m,
+                   BodyMotion& motion) const noexcept;
   void apply_impulses(std::size_t tool_of_step) noexcept;
   void prefetch() noexcept;
   BodyPath path_of(std::size_t body) const noexcept;

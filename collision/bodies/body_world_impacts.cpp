@@ -10,8 +10,8 @@
 namespace wrenchd {
 namespace {
 
-/// A contact counts as rest if it approaches more slowly than this [m/s] plus kFallen times the velocity that
-/// gravity adds in a step.
+/// A contact is at rest, and does not rebound, if it approaches more slowly than kLeastApproach_m_per_s plus
+/// kFallen times the velocity that gravity adds in a step.
 constexpr double kLeastApproach_m_per_s = 0.01;
 constexpr double kFallen = 2.0;
 
@@ -129,8 +129,8 @@ bool BodyWorld::solve_impact(bool elastic) noexcept {
   return true;
 }
 
-/// What the energy of the bodies at the end of the step exceeds that at its start and the work of obstacles
-/// by [J], with this share of the restitution, METHOD (118).
+/// Returns the energy of the bodies at the end of the step, less that at its start and the work of obstacles
+/// [J]. share: part of the restitution, theta of METHOD (118).
 double BodyWorld::energy_rise_J(double share) noexcept {
   double rise_J = 0.0;
   for (const std::size_t i : island_bodies_) {
@@ -141,16 +141,11 @@ double BodyWorld::energy_rise_J(double share) noexcept {
     const BodyContact& c = contacts_[one.contact];
     const ContactGeometry at = acting_geometry(c);
     const Vector3d force_W_N = (1.0 - share) * one.plastic_W_N + share * one.elastic_W_N;
-    const auto push = [&](std::size_t i, double sign) {
-      const Vector3d impulse = sign * impact_.step_s * force_W_N;
-      impact_.after[i].velocity_W_m_per_s += impulse / bodies_[i].M.mass_kg;
-      impact_.after[i].spin_W += (at.point_W_m - acting_pose(i).translation_m).cross(impulse);
-    };
-    push(c.a, 1.0);
+    add_impulse(c.a, impact_.step_s * force_W_N, at.point_W_m, impact_.after[c.a]);
     if (c.b == BodyContact::kFixed)
       rise_J -= force_W_N.dot(other_displacement_m(c, at.point_W_m));
     else
-      push(c.b, -1.0);
+      add_impulse(c.b, -impact_.step_s * force_W_N, at.point_W_m, impact_.after[c.b]);
   }
   for (const std::size_t i : island_bodies_) {
     const Body& body = bodies_[i];

@@ -31,8 +31,8 @@ spdlog::level::level_enum log_level(EventLevel level) {
   return spdlog::level::err;
 }
 
-/// Faults that the feed remembers, and which of them it names as before a cause: those of this time, and this
-/// number of them.
+/// Number of faults that the feed remembers, and largest number and largest age of those that it names beside
+/// the cause of a fault.
 constexpr std::size_t kRecentFaults = 16, kMostBefore = 3;
 constexpr std::chrono::seconds kBefore{10};
 
@@ -156,11 +156,8 @@ void EventFeed::set_fault_recorder(RecordFault recorded_in) {
 void EventFeed::publish(const Event& event) {
   EventDescription description = describe(event);
   if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data)) {
-    {
-      const std::scoped_lock lock(mutex_);
-      recent_faults_.emplace_front(event.at, raised->fault);
-      if (recent_faults_.size() > kRecentFaults) recent_faults_.pop_back();
-    }
+    recent_faults_.emplace_front(event.at, raised->fault);
+    if (recent_faults_.size() > kRecentFaults) recent_faults_.pop_back();
     if (!raised->changed_state) {
       const auto repeats = fault_repeats_.admit(raised->fault, event.at);
       if (!repeats) return;
@@ -182,16 +179,17 @@ void EventFeed::publish(const Event& event) {
   const State from = snapshot_.state;
   apply(snapshot_, event, description);
   if (std::holds_alternative<Event::StateChanged>(event.data))
-    snapshot_.before_cause = faults_before(snapshot_.cause, event.at);
+    snapshot_.before_cause = faults_before(snapshot_.state, snapshot_.cause, event.at);
   append(event.at, description.name, description.level, description.text, description.fields);
   if (const auto* state = std::get_if<Event::StateChanged>(&event.data))
     append_device_event(event.at, from, state->state);
 }
 
-/// Returns FeedSnapshot::before_cause. Precondition: mutex_ is locked.
-std::vector<Fault> EventFeed::faults_before(Fault cause, TimePoint at) const {
+/// Returns FeedSnapshot::before_cause of a state that was entered at this time. Precondition: drain_mutex_ is
+/// locked.
+std::vector<Fault> EventFeed::faults_before(State state, Fault cause, TimePoint at) const {
   std::vector<Fault> before;
-  if (cause == Fault::none) return before;
+  if (cause == Fault::none || state == State::stopped) return before;
   for (const auto& [raised_at, fault] : recent_faults_) {
     const bool known = fault == cause || std::find(before.begin(), before.end(), fault) != before.end();
     if (!known && at - raised_at <= kBefore && before.size() < kMostBefore) before.push_back(fault);
@@ -229,6 +227,7 @@ void EventFeed::drain() {
   const std::scoped_lock lock(mutex_);
   snapshot_.state = loop_.telemetry().state();
   snapshot_.cause = loop_.telemetry().cause();
+  snapshot_.before_cause.clear();  // among the dropped events may be faults
   append(std::chrono::steady_clock::now(), "state", EventLevel::warning,
          fmt::format("{} events were dropped: the log fell behind; state: {}", dropped - dropped_reported_,
                      wrenchd::name(snapshot_.state)),

@@ -38,7 +38,8 @@ struct FeedSnapshot {
   Fault cause = Fault::none;
   Fault last_fault = Fault::none;  ///< newest fault that changed the state; none: there was no such fault
   TimePoint last_fault_at{};       ///< when last_fault was raised
-  /// Other faults of the ten seconds before the cause, the newest first, at most three: often its reason.
+  /// Other faults of the ten seconds before the cause of a fault, the newest first, at most three. They often
+  /// are its reason. Empty for a stop.
   std::vector<Fault> before_cause;
   std::string proxy_initialization = "unknown";  ///< "searching", "found" or "failed"
   std::uint32_t held_body = 0;                   ///< number of the body that the tool holds, from 1; 0: none
@@ -111,7 +112,7 @@ class EventFeed {
   enum class Source : std::uint8_t { loop, other };
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
               const Json& fields, Source source = Source::loop);
-  std::vector<Fault> faults_before(Fault cause, TimePoint at) const;
+  std::vector<Fault> faults_before(State state, Fault cause, TimePoint at) const;
   void append_held_back_faults(TimePoint at, Source source);
   void append_device_event(TimePoint at, State from, State to);
 
@@ -121,13 +122,14 @@ class EventFeed {
   std::uint64_t dropped_reported_ = 0;  ///< dropped events that were reported
   bool device_was_present_ = false;
   RecordFault record_fault_;
-  FaultRepeats fault_repeats_;                   ///< protected by drain_mutex_
+  FaultRepeats fault_repeats_;  ///< protected by drain_mutex_
+  /// The newest first, also those that changed no state; protected by drain_mutex_.
+  std::deque<std::pair<TimePoint, Fault>> recent_faults_;
   ThreadGuard record_guard_{"flight recorder"};  ///< protected by drain_mutex_
 
-  mutable std::mutex mutex_;       ///< protects the members until wake_fd_
+  mutable std::mutex mutex_;       ///< protects history_, snapshot_ and wake_fd_
   std::deque<FeedEvent> history_;  ///< the last event has the number snapshot_.sequence
   FeedSnapshot snapshot_;
-  std::deque<std::pair<TimePoint, Fault>> recent_faults_;  ///< also those that changed no state
   int wake_fd_ = -1;
 
   std::jthread thread_;  ///< last member: it uses the members above

@@ -182,9 +182,12 @@ TEST_CASE("the snapshot names the faults of the ten seconds before the cause", "
   events.emit(now, Event::StateChanged{State::fault, Fault::degraded_too_long});
   feed.drain();
   CHECK(feed.snapshot().before_cause == std::vector{Fault::report_malformed, Fault::watchdog_tripped});
-  events.emit(now, Event::StateChanged{State::disarmed, Fault::none});
-  feed.drain();
-  CHECK(feed.snapshot().before_cause.empty());
+  for (const auto& [state, cause] :
+       {std::pair(State::disarmed, Fault::none), std::pair(State::stopped, Fault::stop_requested)}) {
+    events.emit(now, Event::StateChanged{state, cause});
+    feed.drain();
+    CHECK(feed.snapshot().before_cause.empty());
+  }
 }
 
 TEST_CASE("an error of the flight recorder does not end the feed, and the fault is published",
