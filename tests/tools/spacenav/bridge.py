@@ -40,6 +40,8 @@ class Bridge:
     """Starts programs in the present directory and ends them all. hand.csv is the path of the hand."""
 
     def __init__(self, programs):
+        if not os.path.exists(f"{programs}/wrenchd-spnav"):
+            sys.exit(f"{os.path.basename(sys.argv[0])}: no wrenchd-spnav in {programs}; give the directory of built programs")
         self.programs = programs
         self.control, self.spacenav = os.path.abspath("w.sock"), os.path.abspath("n.sock")
         self.environment = dict(os.environ, SPNAV_SOCKET=self.spacenav, WRENCHD_SOCKET=self.control,
@@ -47,12 +49,19 @@ class Bridge:
         self.running = []
 
     def __enter__(self):
+        try:
+            self.start_both()
+        except BaseException:  # Python then calls no __exit__
+            self.__exit__()
+            raise
+        return self
+
+    def start_both(self):
         self.bridge = self.start([f"{self.programs}/wrenchd-spnav"], "spnav.log")
         wait_for(said("spnav.log", "trying again"), "a message about the missing daemon")
         self.daemon = self.start([f"{self.programs}/wrenchd", "--control", self.control, "--playback", "hand.csv",
                                   "--playback-mode", "open", "--realtime", "off"], "daemon.log")
         wait_for(said("spnav.log", "connected to wrenchd: loopback"), "the connection to wrenchd")
-        return self
 
     def __exit__(self, *_):
         for process in reversed(self.running):
