@@ -19,13 +19,13 @@ constexpr std::size_t kMaxStepsPerUnknown = 8;
 /// Slip below which a cone counts as sticking in a Newton step [m].
 constexpr double kStick_m = 1e-10;
 /// Steps for the lifts of Coulomb's law.
-constexpr int kLiftSteps = 5;
+constexpr int kLiftSteps = 3;
 /// Least pivot of the equations for the lifts; their diagonal is 1 without coupling.
 constexpr double kLeastPivot = 1e-10;
 /// A Newton step that turns no direction of friction farther than this is the last one [rad].
 constexpr double kTurned_rad = 1e-6;
 constexpr double kMostTurned_rad = 1.0;
-constexpr int kNewtonSteps = 16;
+constexpr int kNewtonSteps = 8;
 /// Rounding of a load [N].
 constexpr double kNoLoad_N = 1e-12;
 
@@ -57,6 +57,7 @@ ConeProjection::ConeProjection(std::size_t max_bodies, std::size_t max_cones) {
   suggested_.reserve(static_cast<std::size_t>(size) + 1);
   unknowns_.reserve(3 * static_cast<std::size_t>(size));
   for (Eigen::VectorXd* vector : {&z0_, &z_, &z_before_, &rest_, &r_, &d_}) vector->setZero(size);
+  ranges_.resize(static_cast<std::size_t>(size));
   Q_.setZero(size, size);
   R_.setZero(size, size);
   J_.setZero(3 * size, 3 * size);
@@ -85,6 +86,21 @@ bool ConeProjection::add(const FrictionCone& cone) noexcept {
   if (cones_.size() == cones_.capacity()) return false;
   cones_.push_back(cone);
   return true;
+}
+
+ConeProjection::Range ConeProjection::range_of(const FrictionCone& cone) noexcept {
+  Range range;
+  for (const std::size_t body : {cone.a, cone.b})
+    if (body != FrictionCone::kFixed) range = united(range, {at(body), kBlock});
+  return range;
+}
+
+/// The shortest range with both. One of size 0 has nothing.
+ConeProjection::Range ConeProjection::united(Range a, Range b) noexcept {
+  if (a.size == 0) return b;
+  if (b.size == 0) return a;
+  const Eigen::Index first = std::min(a.first, b.first);
+  return {first, std::max(a.first + a.size, b.first + b.size) - first};
 }
 
 Vector3d ConeProjection::displacement(const FrictionCone& cone, const Eigen::VectorXd& z) const noexcept {
@@ -435,8 +451,10 @@ void ConeProjection::recompute() noexcept {
     const HalfSpace& one = active_[static_cast<std::size_t>(k)];
     r_[k] = (one.bound - product(one, z0_) - dot_column(k, k, r_)) / R_(k, k);
   }
-  const auto size = static_cast<Eigen::Index>(dimension_);
-  for (Eigen::Index k = 0; k < count; ++k) z_.head(size) += r_[k] * Q_.col(k).head(size);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Range& range = ranges_[static_cast<std::size_t>(k)];
+    z_.segment(range.first, range.size) += r_[k] * Q_.col(k).segment(range.first, range.size);
+  }
   back_substitute(r_, d_);
   for (Eigen::Index k = 0; k < count; ++k) active_[static_cast<std::size_t>(k)].multiplier = d_[k];
 }
@@ -483,6 +501,7 @@ void ConeProjection::project_out(const HalfSpace& half_space) noexcept {
   const FrictionCone& cone = cones_[half_space.cone];
   rest_.head(size).setZero();
   push(cone, half_space.normal / half_space.length, rest_);
+  rest_range_ = range_of(cone);
   for (Eigen::Index k = 0; k < count; ++k) {  // only two blocks of the normal are not zero
     const double* column = Q_.col(k).data();
     double c = 0.0;
@@ -490,13 +509,28 @@ void ConeProjection::project_out(const HalfSpace& half_space) noexcept {
       if (body != FrictionCone::kFixed) c += dot(column + at(body), rest_.data() + at(body), kBlock);
     r_[k] = c;
   }
-  for (Eigen::Index k = 0; k < count; ++k) rest_.head(size) -= r_[k] * Q_.col(k).head(size);
-  if (count == 0 || dot(rest_.data(), rest_.data(), size) > kLittleLost) return;
-  for (Eigen::Index k = 0; k < count; ++k) d_[k] = dot(Q_.col(k).data(), rest_.data(), size);
+  for (Eigen::Index k = 0; k < count; ++k) subtract_column(k, r_[k]);
+  const double left =
+      dot(rest_.data() + rest_range_.first, rest_.data() + rest_range_.first, rest_range_.size);
+  if (count == 0 || left > kLittleLost) return;
   for (Eigen::Index k = 0; k < count; ++k) {
-    rest_.head(size) -= d_[k] * Q_.col(k).head(size);
+    const Range& of_column = ranges_[static_cast<std::size_t>(k)];
+    const Eigen::Index first = std::max(of_column.first, rest_range_.first);
+    const Eigen::Index end = std::min(of_column.first + of_column.size, rest_range_.first + rest_range_.size);
+    d_[k] = first < end ? dot(Q_.col(k).data() + first, rest_.data() + first, end - first) : 0.0;
+  }
+  for (Eigen::Index k = 0; k < count; ++k) {
+    subtract_column(k, d_[k]);
     r_[k] += d_[k];
   }
+}
+
+/// Subtracts a multiple of a column of Q from rest_.
+void ConeProjection::subtract_column(Eigen::Index k, double factor) noexcept {
+  if (factor == 0.0) return;
+  const Range& range = ranges_[static_cast<std::size_t>(k)];
+  rest_.segment(range.first, range.size) -= factor * Q_.col(k).segment(range.first, range.size);
+  rest_range_ = united(rest_range_, range);
 }
 
 void ConeProjection::back_substitute(const Eigen::VectorXd& r, Eigen::VectorXd& d) const noexcept {
@@ -532,6 +566,7 @@ void ConeProjection::append(const HalfSpace& half_space, double length) noexcept
   const auto size = static_cast<Eigen::Index>(dimension_);
   const auto k = static_cast<Eigen::Index>(active_.size());
   Q_.col(k).head(size) = rest_.head(size) / length;
+  ranges_[active_.size()] = rest_range_;
   R_.col(k).head(k) = r_.head(k);
   R_(k, k) = length;
   active_.push_back(half_space);
@@ -539,7 +574,6 @@ void ConeProjection::append(const HalfSpace& half_space, double length) noexcept
 
 /// Removes the k-th active half-space. Rotations make R a triangle again.
 void ConeProjection::drop(std::size_t dropped) noexcept {
-  const auto size = static_cast<Eigen::Index>(dimension_);
   const auto first = static_cast<Eigen::Index>(dropped);
   active_.erase(active_.begin() + static_cast<std::ptrdiff_t>(dropped));
   const auto count = static_cast<Eigen::Index>(active_.size());
@@ -551,7 +585,10 @@ void ConeProjection::drop(std::size_t dropped) noexcept {
     for (Eigen::Index j = k + 1; j < count; ++j) rotate(c, s, R_(k, j), R_(k + 1, j));
     double* const a = Q_.col(k).data();
     double* const b = Q_.col(k + 1).data();
-    for (Eigen::Index i = 0; i < size; ++i) rotate(c, s, a[i], b[i]);
+    Range& of_a = ranges_[static_cast<std::size_t>(k)];
+    Range& of_b = ranges_[static_cast<std::size_t>(k) + 1];
+    of_a = of_b = united(of_a, of_b);
+    for (Eigen::Index i = of_a.first; i < of_a.first + of_a.size; ++i) rotate(c, s, a[i], b[i]);
   }
 }
 

@@ -94,7 +94,13 @@ class ConeProjection {
     Vector6d push_a, push_b, row_a, row_b;
     double turn, target;
   };
+  /// Components of a vector outside of which it is zero.
+  struct Range {
+    Eigen::Index first = 0, size = 0;
+  };
   static Eigen::Index at(std::size_t body) noexcept { return static_cast<Eigen::Index>(kBlock * body); }
+  static Range range_of(const FrictionCone& cone) noexcept;
+  static Range united(Range a, Range b) noexcept;
 
   Vector3d displacement(const FrictionCone& cone, const Eigen::VectorXd& z) const noexcept;
   Vector3d slip(const FrictionCone& cone) const noexcept;
@@ -120,6 +126,7 @@ class ConeProjection {
   bool activate(HalfSpace entering) noexcept;
   double bound(const HalfSpace& half_space) const noexcept;
   void project_out(const HalfSpace& half_space) noexcept;
+  void subtract_column(Eigen::Index column, double factor) noexcept;
   double dot_column(Eigen::Index column, Eigen::Index rows, const Eigen::VectorXd& x) const noexcept;
   void back_substitute(const Eigen::VectorXd& r, Eigen::VectorXd& d) const noexcept;
   bool append(const HalfSpace& half_space) noexcept;
@@ -133,10 +140,12 @@ class ConeProjection {
   std::vector<HalfSpace> suggested_;  ///< only their cones and normals
   std::vector<Unknown> unknowns_;     ///< of the Newton step for Coulomb's law
   Eigen::VectorXd z0_, z_, z_before_, rest_, r_, d_;
-  Eigen::MatrixXd Q_;        ///< orthonormal columns
-  Eigen::MatrixXd R_;        ///< upper triangle: active normals = Q R
-  Eigen::MatrixXd J_;        ///< Jacobian of the Newton step for Coulomb's law
-  Eigen::VectorXd x_, d_x_;  ///< right side of the Newton step, and its solution
+  Range rest_range_;           ///< of rest_ after project_out()
+  std::vector<Range> ranges_;  ///< of the columns of Q_: a chain of bodies leaves most of them short
+  Eigen::MatrixXd Q_;          ///< orthonormal columns
+  Eigen::MatrixXd R_;          ///< upper triangle: active normals = Q R
+  Eigen::MatrixXd J_;          ///< Jacobian of the Newton step for Coulomb's law
+  Eigen::VectorXd x_, d_x_;    ///< right side of the Newton step, and its solution
   std::vector<Eigen::Index>
       pivots_;                    ///< row of the pivot of each column of J_; -1: the column depends on others
   std::vector<Vector3d> forces_;  ///< force of each cone on its body a

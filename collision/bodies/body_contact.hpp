@@ -30,6 +30,10 @@ struct BodyContact {
   double slip_m = 0.0;                         ///< length of the slip in the last step
   StaticVector<Vector3d, 4> active_normals;    ///< of its cone, at the last answer (ConeProjection)
   bool stays = false;                          ///< is not dropped in this step
+  /// Second derivative of the gap by the pose of the tool with this number of a body, which moves a or b: its
+  /// translation in W and its rotation in T. kFixed: not known in this step.
+  std::size_t curvature_of = kFixed;
+  Matrix6d curvature;
 };
 
 /// The gap [m], the normal and the contact point in W of a contact. X_WA, X_WB: poses of its bodies; X_WB is

@@ -88,6 +88,7 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
 void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
   tool_was_moved_ = false;
   bodies_[body].motion = motion;
+  bodies_[body].last_way_m = 0.0;
   for (Body& one : bodies_) {
     one.asleep = false;
     one.calm_steps = 0;
@@ -163,8 +164,9 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
     tools_[0].load_W = {};
     save();
   }
-  bodies_before_[0] = {bodies_[0].motion, false, 0};
+  bodies_before_[0] = {bodies_[0].motion, false, 0, bodies_[0].last_way_m};
   time_before_s_ = time_s_;
+  bodies_[0].last_way_m = longest_way_m({bodies_[0].motion.X_WB, X_WT}, bodies_[0].radius_m);
   bodies_[0].motion.X_WB = X_WT;
   time_s_ = until_s;
   tools_[0].grasp_broke = false;
@@ -175,7 +177,8 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
 /// Copies the state that take_back() restores.
 void BodyWorld::save() noexcept {
   bodies_before_.clear();
-  for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
+  for (const Body& body : bodies_)
+    bodies_before_.push_back({body.motion, body.asleep, body.calm_steps, body.last_way_m});
   contacts_before_ = contacts_;  // equal capacities: no allocation
   time_before_s_ = time_s_;
   tools_before_ = tools_;
@@ -222,6 +225,7 @@ void BodyWorld::begin(const std::optional<Hand>& hand, std::size_t tool) noexcep
   dropped_.clear();
   for (BodyContact& contact : contacts_) {
     contact.stays = false;
+    contact.curvature_of = BodyContact::kFixed;
     contact.last_force_W_N = contact.force_W_N;
     bodies_[contact.a].touches = true;
     if (contact.b != BodyContact::kFixed) bodies_[contact.b].touches = true;
@@ -248,6 +252,7 @@ double BodyWorld::held_gap_m(const BodyContact& c, double opening_m) const noexc
 /// A body without contact ends where its exact motion ends. One with contact moves at the velocity that it
 /// has at the end, METHOD (102). In a shortened step less time passes for the body.
 void BodyWorld::set_goal(Body& body) noexcept {
+  body.shortened = false;
   if (body.asleep) {
     body.step_s = 0.0;
     body.free = body.motion;
@@ -386,6 +391,7 @@ void BodyWorld::take_back() noexcept {
     bodies_[i].motion = bodies_before_[i].motion;
     bodies_[i].asleep = bodies_before_[i].asleep;
     bodies_[i].calm_steps = bodies_before_[i].calm_steps;
+    bodies_[i].last_way_m = bodies_before_[i].last_way_m;
   }
   contacts_ = contacts_before_;  // equal capacities: no allocation
   time_s_ = time_before_s_;
@@ -456,7 +462,9 @@ void BodyWorld::apply_impulses(std::size_t tool_of_step) noexcept {
     push(c.b, -1.0);
   }
   push_held();
-  for (Body& body : bodies_) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    Body& body = bodies_[i];
+    body.last_way_m = way_of_step_m(i);
     body.free.X_WB = body.X_WQ;
     body.motion = body.free;
   }

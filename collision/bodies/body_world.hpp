@@ -165,24 +165,28 @@ class BodyWorld {
     double friction = 0.0;
     double restitution = 0.0;
     double radius_m = 0.0;
-    BodyMotion motion;                     ///< at the end of the last step
-    BodyMotion free;                       ///< without contact, at the end of this step
-    Pose X_goal;                           ///< p of the projection
-    Pose X_WQ;                             ///< q
-    Pose X_WQ_swept;                       ///< q of the last sweeps
-    double weight_per_s2 = 0.0;            ///< kappa, 0: takes no part
-    double fraction = 1.0;                 ///< part of the step that the body tries
-    double step_s = 0.0;                   ///< time that passes for the body [s]
-    std::size_t island = 0;                ///< number of the body that represents its island
-    bool touches = false;                  ///< has a contact
-    bool solved = false;                   ///< q is the answer for the present contacts
-    bool asleep = false;                   ///< rests until something touches its island
-    std::uint16_t calm_steps = 0;          ///< consecutive steps in which it hardly moved
-    std::size_t block = 0;                 ///< number of the body in the problem of its island
-    std::size_t tool = kNoTool;            ///< number of the tool that the body is
-    std::size_t mover = 0;                 ///< body whose unknowns move it: itself, or the tool that holds it
-    Pose X_MB;                             ///< its pose in the frame of the mover
-    Matrix6d root = Matrix6d::Identity();  ///< upper triangular root of the metric at q
+    BodyMotion motion;             ///< at the end of the last step
+    BodyMotion free;               ///< without contact, at the end of this step
+    Pose X_goal;                   ///< p of the projection
+    Pose X_WQ;                     ///< q
+    Pose X_WQ_swept;               ///< q of the last sweeps
+    BodyPath next;                 ///< path of the next step if it meets nothing
+    double weight_per_s2 = 0.0;    ///< kappa, 0: takes no part
+    double fraction = 1.0;         ///< part of the step that the body tries
+    bool shortened = false;        ///< tries a smaller part than its q is for
+    double last_way_m = 0.0;       ///< upper bound on the way of a point in the last step
+    double step_s = 0.0;           ///< time that passes for the body [s]
+    std::size_t island = 0;        ///< number of the body that represents its island
+    bool touches = false;          ///< has a contact
+    bool solved = false;           ///< q is the answer for the present contacts
+    bool asleep = false;           ///< rests until something touches its island
+    std::uint16_t calm_steps = 0;  ///< consecutive steps in which it hardly moved
+    std::size_t block = 0;         ///< number of the body in the problem of its island
+    std::size_t tool = kNoTool;    ///< number of the tool that the body is
+    std::size_t mover = 0;         ///< body whose unknowns move it: itself, or the tool that holds it
+    Pose X_MB;                     ///< its pose in the frame of the mover
+    Vector6d newton_step, newton_step_before;  ///< of q: translation in W [m], rotation in B [rad]
+    Matrix6d root = Matrix6d::Identity();      ///< upper triangular root of the metric at q
   };
 
   /// A tool that a hand leads. A step changes it.
@@ -225,8 +229,11 @@ class BodyWorld {
   std::size_t root_of(std::size_t body) noexcept;
   void solve_islands() noexcept;
   bool solve_island(std::size_t island) noexcept;
+  bool converge(std::size_t island) noexcept;
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
   bool newton_step(Friction friction) noexcept;
+  bool extrapolate() noexcept;
+  void move(std::size_t body, const Vector6d& step) noexcept;
   Vector6d descent(std::size_t body) noexcept;
   static Vector6d pull_gradient(const Body& body, const Pose& X_goal) noexcept;
   static Matrix6d metric_of(const Body& body) noexcept;
@@ -251,7 +258,8 @@ class BodyWorld {
   void finish_grasps() noexcept;
   static void begin_work(Tool& tool, bool is_of_step) noexcept;
   void advance_returns() noexcept;
-  bool root_with_curvature(std::size_t mover, const Matrix6d& metric) noexcept;
+  void set_root_with_curvature(std::size_t mover, const Matrix6d& metric) noexcept;
+  void set_curvature(std::size_t mover, BodyContact& contact) const noexcept;
   Vector6d gap_gradient(std::size_t mover, const BodyContact& contact, const Vector6d& step) const noexcept;
   FrictionCone cone_of(const BodyContact& contact, Friction friction) const noexcept;
   Vector3d displacement_m(std::size_t body, const Vector3d& point_W_m) const noexcept;
@@ -265,6 +273,15 @@ class BodyWorld {
   bool takes_part(std::size_t body) const noexcept;
   bool sweep_pairs() noexcept;
   bool sweep_pair(BodyPair& pair) noexcept;
+  SweepQuery::SweepResult sweep(BodyPair& pair, double clearance_m) noexcept;
+  double last_way_of_island_m(std::size_t body) const noexcept;
+  bool a_tool_jumps() const noexcept;
+  double way_of_step_m(std::size_t body) const noexcept {
+    return longest_way_m(path_of(body), bodies_[body].radius_m);
+  }
+  bool is_shortened(std::size_t body) const noexcept {
+    return body != BodyContact::kFixed && bodies_[body].shortened;
+  }
   bool add_behind(BodyPair& pair) noexcept;
   bool add_touching(BodyPair& pair) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
@@ -300,6 +317,7 @@ class BodyWorld {
     BodyMotion motion;
     bool asleep;
     std::uint16_t calm_steps;
+    double last_way_m;
   };
   std::vector<BodyState> bodies_before_;      ///< before the last step
   std::vector<BodyContact> contacts_before_;  ///< before the last step

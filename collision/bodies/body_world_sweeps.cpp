@@ -16,6 +16,9 @@ constexpr double kNearby = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
+/// The first part of a path that is swept: this multiple of the longest way in the island in the last step
+/// and this distance. It then grows by the factor kLonger.
+constexpr double kFirstPart = 1.5, kFirstPart_m = 2e-4, kLonger = 4.0;
 
 }  // namespace
 
@@ -37,6 +40,7 @@ bool BodyWorld::sweep_pairs() noexcept {
       return i != BodyContact::kFixed && !same_bits(bodies_[i].X_WQ, bodies_[i].X_WQ_swept);
     };
     if (!takes_part(pair->a()) || !takes_part(pair->b()) || joins(*pair)) continue;
+    if (is_shortened(pair->a()) || is_shortened(pair->b())) continue;
     const bool moves = pair->is_fixed() && pair->scene().has_moving_obstacles();
     if (!moves && !changed(pair->a()) && !changed(pair->b())) continue;
     if (!sweep_pair(*pair)) free = false;
@@ -56,10 +60,8 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
     pair.add_half_spaces(bodies_[pair.a()].X_WQ, 0.5 * kClearance_m, met);
     for (std::size_t k = known; k < met.size(); ++k) free = !add_contact(pair, met[k]) && free;
   }
-  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
-  if (!pair.is_near(path_a, path_b)) return free;
-  const SweepQuery::SweepResult found =
-      pair.sweep(path_a, path_b, kClearance_m, budget_, {time_s_, until_s_});
+  if (!pair.is_near(path_of(pair.a()), path_of(pair.b()))) return free;
+  const SweepQuery::SweepResult found = sweep(pair, kClearance_m);
   bool found_new = false;
   for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return false;
@@ -71,17 +73,49 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
   return false;
 }
 
+/// Sweeps the paths of a pair. Of a long one a short part first, and then a longer one: most meet something
+/// soon.
+SweepQuery::SweepResult BodyWorld::sweep(BodyPair& pair, double clearance_m) noexcept {
+  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
+  double part = 1.0;
+  for (const std::size_t i : {pair.a(), pair.b()})
+    if (i != BodyContact::kFixed)
+      part = std::min(part, (kFirstPart * last_way_of_island_m(i) + kFirstPart_m) / way_of_step_m(i));
+  for (; part * kLonger < 1.0; part *= kLonger) {
+    const auto first_part = [part](const BodyPath& path) {
+      return BodyPath{path.start, between(path.start, path.end, part)};
+    };
+    const BodyPair::SweepTimes times = {time_s_, time_s_ + part * (until_s_ - time_s_)};
+    const SweepQuery::SweepResult found =
+        pair.sweep(first_part(path_a), first_part(path_b), clearance_m, budget_, times);
+    if (!found.complete || found.overlaps || !found.contacts.empty()) return found;
+  }
+  return pair.sweep(path_a, path_b, clearance_m, budget_, {time_s_, until_s_});
+}
+
+/// The longest way of a point of the island of a body in the last step, or of an obstacle that it touches in
+/// this one [m]: what touches a body may drive it.
+double BodyWorld::last_way_of_island_m(std::size_t body) const noexcept {
+  const std::size_t island = bodies_[body].island;
+  double longest_m = 0.0;
+  for (const Body& one : bodies_)
+    if (one.island == island) longest_m = std::max(longest_m, one.last_way_m);
+  for (const BodyContact& c : contacts_)
+    if (c.b == BodyContact::kFixed && bodies_[c.a].island == island)
+      longest_m = std::max(longest_m, other_displacement_m(c, geometry(c).point_W_m).norm());
+  return longest_m;
+}
+
 /// Adds contacts that a sweep did not name because the path meets known ones first. These are held open, but
 /// at less than the clearance. Returns true if there are such contacts.
 bool BodyWorld::add_behind(BodyPair& pair) noexcept {
-  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
-  const BodyPair::SweepTimes times = {time_s_, until_s_};
-  const SweepQuery::SweepResult behind = pair.sweep(path_a, path_b, kBehind * kClearance_m, budget_, times);
+  const SweepQuery::SweepResult behind = sweep(pair, kBehind * kClearance_m);
   bool found_new = false;
   for (const Contact& contact : behind.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return true;
   if (behind.complete && !behind.overlaps && behind.contacts.empty()) {
-    pair.sweep(path_a, path_b, kClearance_m, budget_, times);  // for touches()
+    pair.sweep(path_of(pair.a()), path_of(pair.b()), kClearance_m, budget_,
+               {time_s_, until_s_});  // for touches()
     return false;
   }
   shorten(pair);
@@ -132,6 +166,7 @@ void BodyWorld::shorten(const BodyPair& pair) noexcept {
       if (body.island != island) continue;
       body.fraction = shorter(body.fraction);
       body.solved = false;
+      body.shortened = true;
     }
   }
 }
@@ -183,18 +218,17 @@ bool BodyWorld::drop_separated() noexcept {
 
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.
 void BodyWorld::prefetch() noexcept {
+  for (Body& body : bodies_) {
+    body.next = {body.motion.X_WB, body.motion.X_WB};
+    if (body.asleep) continue;
+    body.next.end =
+        body.tool != kNoTool ? body.X_goal : moved_freely(body.M, body.motion, body.forces, dt_s_).X_WB;
+  }
   const auto still = [&](std::size_t i) { return i == BodyContact::kFixed || bodies_[i].asleep; };
+  const auto next = [&](std::size_t i) { return i == BodyContact::kFixed ? BodyPath{} : bodies_[i].next; };
   for (const auto& pair : pairs_) {
     if (!takes_part(pair->a()) || !takes_part(pair->b()) || joins(*pair)) continue;
     if (still(pair->a()) && still(pair->b()) && !pair->scene().has_moving_obstacles()) continue;
-    const auto next = [&](std::size_t i) {
-      if (i == BodyContact::kFixed) return BodyPath{};
-      const BodyMotion& motion = bodies_[i].motion;
-      if (bodies_[i].asleep) return BodyPath{motion.X_WB, motion.X_WB};
-      return BodyPath{motion.X_WB, is_tool(i)
-                                       ? bodies_[i].X_goal
-                                       : moved_freely(bodies_[i].M, motion, bodies_[i].forces, dt_s_).X_WB};
-    };
     const BodyPath path_a = next(pair->a()), path_b = next(pair->b());
     if (pair->is_near(path_a, path_b)) pair->prefetch(path_a, path_b, time_s_, budget_);
   }
