@@ -195,6 +195,7 @@ bool BodyWorld::extrapolate() noexcept {
     before += one_before.squaredNorm();
     now += last.squaredNorm();
   }
+  if (!(before > 0.0)) return false;
   const double ratio = product / before;
   if (!(product * product > kAligned * before * now) || !(std::abs(ratio) > kSlow)) return false;
   const double factor = std::clamp(ratio / (1.0 - ratio), -kFarthest, kFarthest);

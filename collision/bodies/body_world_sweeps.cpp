@@ -17,8 +17,8 @@ constexpr double kNearby = 4.0;
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
 /// The first part of a path that is swept: this multiple of the longest way in the island in the last step
-/// and this distance. It then grows by the factor kLonger.
-constexpr double kFirstPart = 1.5, kFirstPart_m = 2e-4, kLonger = 4.0;
+/// and this distance, at least kLeastPart of the path. It then grows by the factor kLonger.
+constexpr double kFirstPart = 1.5, kFirstPart_m = 2e-4, kLeastPart = 1.0 / 1024.0, kLonger = 4.0;
 
 }  // namespace
 
@@ -74,20 +74,20 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
 }
 
 /// Sweeps the paths of a pair. Of a long one a short part first, and then a longer one: most meet something
-/// soon.
+/// soon. Contacts with obstacles that move are those at the end of the step, so there only the whole path
+/// counts.
 SweepQuery::SweepResult BodyWorld::sweep(BodyPair& pair, double clearance_m) noexcept {
   const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
   double part = 1.0;
   for (const std::size_t i : {pair.a(), pair.b()})
-    if (i != BodyContact::kFixed)
+    if (i != BodyContact::kFixed && !pair.scene().has_moving_obstacles())
       part = std::min(part, (kFirstPart * last_way_of_island_m(i) + kFirstPart_m) / way_of_step_m(i));
-  for (; part * kLonger < 1.0; part *= kLonger) {
+  for (part = std::max(part, kLeastPart); part * kLonger < 1.0; part *= kLonger) {
     const auto first_part = [part](const BodyPath& path) {
       return BodyPath{path.start, between(path.start, path.end, part)};
     };
-    const BodyPair::SweepTimes times = {time_s_, time_s_ + part * (until_s_ - time_s_)};
     const SweepQuery::SweepResult found =
-        pair.sweep(first_part(path_a), first_part(path_b), clearance_m, budget_, times);
+        pair.sweep(first_part(path_a), first_part(path_b), clearance_m, budget_, {time_s_, until_s_});
     if (!found.complete || found.overlaps || !found.contacts.empty()) return found;
   }
   return pair.sweep(path_a, path_b, clearance_m, budget_, {time_s_, until_s_});
