@@ -275,7 +275,6 @@ class BodyWorld {
   bool sweep_pair(BodyPair& pair) noexcept;
   SweepQuery::SweepResult sweep(BodyPair& pair, double clearance_m) noexcept;
   double last_way_of_island_m(std::size_t body) const noexcept;
-  bool a_tool_jumps() const noexcept;
   double way_of_step_m(std::size_t body) const noexcept {
     return longest_way_m(path_of(body), bodies_[body].radius_m);
   }

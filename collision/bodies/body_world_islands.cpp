@@ -16,10 +16,6 @@ constexpr int kLateSteps = 9;
 constexpr double kAccepted_m = 1e-7;
 /// An acceptable solve ends if its steps fall by less than this factor.
 constexpr double kStalled = 0.5;
-/// A tool jumps if a point moves farther than this multiple of the longest way in its island in the last step
-/// and this distance.
-constexpr double kJump = 4.0, kJump_m = 1e-3;
-
 }  // namespace
 
 std::size_t BodyWorld::root_of(std::size_t body) noexcept {
@@ -91,8 +87,8 @@ bool BodyWorld::solve_island(std::size_t island) noexcept {
   }
   if (converge(island)) return true;
   for (int k = 0; k < kNewtonSteps; ++k)
-    if (newton_step(Friction::none) || a_tool_jumps()) break;
-  if (!a_tool_jumps() && last_change_m_ <= kAccepted_m && admissible(island)) return true;
+    if (newton_step(Friction::none)) break;
+  if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
   for (Body& body : bodies_)
     if (body.island == island && body.weight_per_s2 > 0.0) body.X_WQ = body.motion.X_WB;
   return false;
@@ -106,7 +102,6 @@ bool BodyWorld::converge(std::size_t island) noexcept {
     const bool in_time = solver_steps_ < settings_.solver_steps;
     const double change_before_m = last_change_m_;
     if (newton_step(in_time && has_coulomb ? Friction::coulomb : Friction::frozen)) break;
-    if (a_tool_jumps()) return false;
     if (cones_status_ == ConeProjection::Status::budget_spent) has_coulomb = false;
     const bool stalls = k > 0 && last_change_m_ > kStalled * change_before_m;
     if (last_change_m_ <= kAccepted_m && stalls && admissible(island)) break;
@@ -114,14 +109,6 @@ bool BodyWorld::converge(std::size_t island) noexcept {
     extrapolated = k > 0 && !extrapolated && extrapolate();
   }
   return last_change_m_ <= kAccepted_m && admissible(island);
-}
-
-/// True if a tool of the present island leaves the surroundings in which its contacts are known.
-bool BodyWorld::a_tool_jumps() const noexcept {
-  return std::any_of(island_bodies_.begin(), island_bodies_.end(), [this](std::size_t i) {
-    return is_tool(i) && way_of_step_m(i) > kJump_m &&
-           way_of_step_m(i) > kJump * last_way_of_island_m(i) + kJump_m;
-  });
 }
 
 /// True if the present poses of an island keep all its known contacts open.

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@
 #include "tests/support/random_values.hpp"
 
 // Boxes on a plane: wrenchd's free bodies beside other simulators, on the same scenes with the same step.
-// Time, overlap, drift and the errors against closed forms.
+// Time, overlap, drift and the errors against closed forms. Then bodies of fine meshes that a tool pushes,
+// which the others have not: their meshes are convex or soft, and no tool is led by a hand.
 
 namespace {
 
@@ -303,6 +305,70 @@ std::string against_closed_form(const BoxScene& scene, const Figures& figures) {
   return "-";
 }
 
+/// A tool that a hand pushes into three bodies on a table, all of the same kind of mesh.
+struct PushedBodies {
+  std::string name, kind;
+  std::uint32_t triangles;
+  double pressed_m;  ///< how far the hand goes below the height at which the tool touches a body that lies
+};
+
+struct PushFigures {
+  std::vector<double> us;
+  std::size_t contacts = 0, unfinished = 0;
+};
+
+/// Runs eight random hands for some seconds each: they sink at 50 mm/s and move about in a circle of 30 mm.
+PushFigures push(const PushedBodies& given, double seconds, const CounterScale& scale) {
+  const bool is_cube = given.kind == "box";
+  const auto mesh = [&](std::uint32_t seed) {
+    GeneratedMesh request;
+    request.kind = given.kind;
+    request.triangles = given.triangles;
+    request.seed = seed;
+    request.size_m = Vector3d::Constant(0.05);
+    return make_mesh(request);
+  };
+  const Scene scene(tool_body(mesh(1), 1.0, 0.1), {HalfSpaceSettings{"table", Vector3d::UnitZ(), 0.0}});
+  std::vector<FreeBody> bodies(3);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    bodies[i].body = tool_body(mesh(2 + static_cast<std::uint32_t>(i)), 1.0, 0.1);
+    bodies[i].friction = 0.5;
+    const auto k = static_cast<double>(i);
+    const double turn = 2.0 / 3.0 * std::numbers::pi * k;
+    bodies[i].motion.X_WB.translation_m = is_cube
+                                              ? Vector3d(0.0505 * k, 0.001 * k, 0.0251)
+                                              : Vector3d(0.06 * std::cos(turn), 0.06 * std::sin(turn), 0.05);
+  }
+  BodyWorld::Settings settings;
+  settings.tool_friction = 0.3;
+  settings.sleeps = false;
+  const double top_m = is_cube ? 0.075 : 0.13;
+  PushFigures figures;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    test::RandomValues random(seed);
+    BodyWorld world(scene, bodies, settings);
+    const Vector3d centre_m = random.vector<3>(0.04), swing_m = random.vector<3>(0.03);
+    const Vector3d turn = random.vector<3>(0.5);
+    BodyWorld::Hand hand;
+    hand.stiffness_per_s2 = 20000.0;
+    hand.X_WP.translation_m = {centre_m.x(), 0.5 * centre_m.y(), top_m + 0.005};
+    world.enter_tool(0, hand.X_WP);
+    for (int k = 0; k < static_cast<int>(std::lround(seconds / kStep_s)); ++k) {
+      const double t_s = kStep_s * k;
+      hand.X_WP.translation_m = {centre_m.x() + swing_m.x() * std::sin(3.0 * t_s),
+                                 0.5 * centre_m.y() + swing_m.y() * std::sin(2.3 * t_s),
+                                 top_m + 0.005 - std::min(0.005 + given.pressed_m, 0.05 * t_s)};
+      hand.X_WP.rotation = rotation_from(std::sin(t_s) * turn);
+      const std::int64_t start = counter();
+      const BodyWorld::Status status = world.step(hand, kStep_s);
+      figures.us.push_back(1e-3 * scale.ns(counter() - start));
+      figures.unfinished += status != BodyWorld::Status::converged ? 1 : 0;
+      figures.contacts += world.contacts().size();
+    }
+  }
+  return figures;
+}
+
 /// Starts the program again with one thread for linear algebra, unless it is so already. Every simulator has
 /// one thread; the libraries below Siconos read the number of theirs when they are loaded, and threads that
 /// wait for each other on a busy machine are no measure of it.
@@ -318,7 +384,7 @@ void use_one_thread(char** argv) {
 
 int main(int argc, char** argv) {
   use_one_thread(argv);
-  CLI::App app("bench_bodies: boxes on a plane, beside other simulators.");
+  CLI::App app("bench_bodies: boxes on a plane, beside other simulators; fine bodies that a tool pushes.");
   double seconds = 10.0;
   bool quick = false;
   std::filesystem::path csv;
@@ -362,7 +428,23 @@ int main(int argc, char** argv) {
       add(peer.name(), theirs);
     }
   }
+  Table pushed("pushed by a tool",
+               {"p50 us", "p99 us", "p99.9 us", "max us", "contacts", "steps with a shorter time %"});
+  for (const PushedBodies& given :
+       {PushedBodies{"three cubes of 20k, pressed by 5 mm", "box", 20'000, 0.005},
+        PushedBodies{"three cubes of 20k, pressed by 50 mm", "box", 20'000, 0.05},
+        PushedBodies{"three bumpy bodies of 20k, between which the tool sinks by 50 mm", "bumpy", 20'000,
+                     0.05}}) {
+    const PushFigures figures = push(given, quick ? 0.5 : 4.0, scale);
+    const Quantiles us = quantiles(figures.us);
+    const auto steps = static_cast<double>(figures.us.size());
+    pushed.add(given.name, "wrenchd",
+               {fixed(us.p50, 1), fixed(us.p99, 1), fixed(us.p999, 1), fixed(us.max, 1),
+                fixed(static_cast<double>(figures.contacts) / steps, 1),
+                fixed(100.0 * static_cast<double>(figures.unfinished) / steps, 2)});
+  }
   table.print(std::cout);
-  if (!csv.empty()) write_csv(csv, {table});
+  pushed.print(std::cout);
+  if (!csv.empty()) write_csv(csv, {table, pushed});
   return 0;
 }

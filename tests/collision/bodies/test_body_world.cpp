@@ -209,13 +209,10 @@ TEST_CASE("the tool pushes a body, and the hand feels its friction", "[body_worl
   CHECK(moved_m == Approx(0.05 * (kTicks - kSettled) * kStep_s).epsilon(0.03));
 }
 
-TEST_CASE("a tool that presses bodies aside turns over in several steps, and friction does not vanish",
-          "[body_world]") {
+TEST_CASE("friction does not vanish where a tool presses bodies aside", "[body_world]") {
   const Scene scene = table();
   test::RandomValues random(3);
-  std::size_t loaded = 0, frictionless = 0;
-  std::uint32_t most_visits = 0;
-  double longest_ratio = 0.0;
+  std::size_t loaded = 0, frictionless = 0, unfinished = 0;
   for (int run = 0; run < 4; ++run) {
     BodyWorld::Settings settings;
     settings.tool_friction = 0.3;
@@ -230,44 +227,28 @@ TEST_CASE("a tool that presses bodies aside turns over in several steps, and fri
     hand.stiffness_per_s2 = 20000.0;
     hand.X_WP.translation_m = {centre_m.x(), 0.4 * centre_m.y(), 0.08};
     world.enter_tool(0, hand.X_WP);
-    double last_way_m = 0.0;
-    bool touched = false;
     for (int k = 0; k < 3000; ++k) {
       const double t_s = kStep_s * k;
       hand.X_WP.translation_m = {centre_m.x() + swing_m.x() * std::sin(3.0 * t_s),
                                  0.4 * centre_m.y() + swing_m.y() * std::sin(2.3 * t_s),
                                  0.08 - std::min(0.06, 0.05 * t_s)};
       hand.X_WP.rotation = rotation_from(std::sin(t_s) * turn);
-      std::vector<Pose> start;
-      for (std::size_t i = 0; i < world.body_count(); ++i) start.push_back(world.motion(i).X_WB);
-      world.step(hand, kStep_s);
-      most_visits = std::max(most_visits, world.node_visits());
+      unfinished += world.step(hand, kStep_s) != BodyWorld::Status::converged ? 1 : 0;
       double load_N = 0.0, friction_N = 0.0;
-      bool touches = false;
       for (const BodyContact& c : world.contacts()) {
-        const double normal_N = c.force_W_N.dot(c.normal_W);
-        touches = touches || c.a == 0;
         if (c.a != 0) continue;
+        const double normal_N = c.force_W_N.dot(c.normal_W);
         load_N += normal_N;
         friction_N += (c.force_W_N - normal_N * c.normal_W).norm();
       }
       loaded += load_N > 1.0 ? 1 : 0;
       frictionless += load_N > 1.0 && friction_N < 1e-9 ? 1 : 0;
-      const double radius_m = 0.025 * std::sqrt(3.0);
-      double way_m = 0.0;
-      for (std::size_t i = 0; i < start.size(); ++i)
-        way_m = std::max(way_m, longest_way_m({start[i], world.motion(i).X_WB}, radius_m));
-      // An obstacle or a body that is new in the island may be faster; the hand itself is at 0.2 m/s.
-      if (touched && touches) longest_ratio = std::max(longest_ratio, way_m / (4.0 * last_way_m + 1e-3));
-      touched = touches;
-      last_way_m = way_m;
     }
   }
   INFO(frictionless << " of " << loaded << " steps without friction");
   CHECK(loaded > 5000);
   CHECK(50 * frictionless < loaded);
-  CHECK(longest_ratio <= 1.0);
-  CHECK(most_visits < 20'000);
+  CHECK(unfinished < 240);  // of 12,000
 }
 
 TEST_CASE("a tool among bodies that it does not touch follows its hand as a proxy does", "[body_world]") {
