@@ -229,7 +229,7 @@ class BodyWorld {
   std::size_t root_of(std::size_t body) noexcept;
   void solve_islands() noexcept;
   bool solve_island(std::size_t island) noexcept;
-  bool converge(std::size_t island) noexcept;
+  bool converge(std::size_t island, Friction friction) noexcept;
   const BodyPair& pair_of(const BodyContact& contact) const noexcept;
   bool newton_step(Friction friction) noexcept;
   bool extrapolate() noexcept;

@@ -85,24 +85,24 @@ bool BodyWorld::solve_island(std::size_t island) noexcept {
     for (const std::size_t i : island_bodies_) bodies_[i].X_WQ = bodies_[i].X_goal;
     return true;
   }
-  if (converge(island)) return true;
-  for (int k = 0; k < kNewtonSteps; ++k)
-    if (newton_step(Friction::none)) break;
-  if (last_change_m_ <= kAccepted_m && admissible(island)) return true;
+  if (converge(island, Friction::coulomb) || converge(island, Friction::none)) return true;
   for (Body& body : bodies_)
     if (body.island == island && body.weight_per_s2 > 0.0) body.X_WQ = body.motion.X_WB;
   return false;
 }
 
-/// Newton's method for an island with friction. Returns false if it has no admissible answer.
-bool BodyWorld::converge(std::size_t island) noexcept {
+/// Newton's method for an island. Coulomb's law gives way to cones with the lifts that they have where it has
+/// no answer. Returns false if there is no admissible answer.
+bool BodyWorld::converge(std::size_t island, Friction friction) noexcept {
   for (const std::size_t i : island_bodies_) bodies_[i].newton_step.setZero();
-  bool has_coulomb = true, extrapolated = false;
+  bool extrapolated = false;
   for (int k = 0;; ++k) {
-    const bool in_time = solver_steps_ < settings_.solver_steps;
+    const bool in_time = friction == Friction::none || solver_steps_ < settings_.solver_steps;
+    if (!in_time) friction = Friction::frozen;
     const double change_before_m = last_change_m_;
-    if (newton_step(in_time && has_coulomb ? Friction::coulomb : Friction::frozen)) break;
-    if (cones_status_ == ConeProjection::Status::budget_spent) has_coulomb = false;
+    if (newton_step(friction)) break;
+    if (friction == Friction::coulomb && cones_status_ == ConeProjection::Status::budget_spent)
+      friction = Friction::frozen;
     const bool stalls = k > 0 && last_change_m_ > kStalled * change_before_m;
     if (last_change_m_ <= kAccepted_m && stalls && admissible(island)) break;
     if (k + 1 >= (in_time ? kNewtonSteps : kLateSteps)) break;
