@@ -5,11 +5,15 @@
 #include <utility>
 
 namespace wrenchd {
+namespace {
 
-double longest_way_m(const BodyPath& path, double radius_m) noexcept {
+/// METHOD (92).
+double displacement_bound_m(const BodyPath& path, double radius_m) noexcept {
   return (path.end.translation_m - path.start.translation_m).norm() +
          radius_m * path.start.rotation.angularDistance(path.end.rotation);
 }
+
+}  // namespace
 
 BodyPair::BodyPair(std::size_t a, std::size_t b, Scene scene)
     : a_(a), b_(b), scene_(std::move(scene)), half_spaces_(scene_), contacts_(scene_) {}
@@ -21,14 +25,15 @@ Pose BodyPair::in_b(const Pose& X_WA, const Pose& X_WB) const noexcept {
 bool BodyPair::is_near(const BodyPath& path_a, const BodyPath& path_b) const noexcept {
   if (scene_.meshes().empty()) return false;
   if (scene_.has_moving_obstacles()) return true;
-  const double reach_m = scene_.tool_radius_m() + longest_way_m(path_a, scene_.tool_radius_m());
+  const double reach_m = scene_.tool_radius_m() + displacement_bound_m(path_a, scene_.tool_radius_m());
   const auto touches_sphere = [&](const Vector3d& centre_W_m, double radius_m) {
     return (centre_W_m - path_a.start.translation_m).norm() <= reach_m + radius_m;
   };
   if (!is_fixed()) {
     const MeshObstacle& other = scene_.meshes().front();
-    return touches_sphere(path_b.start * other.centre_O_m,
-                          other.radius_m + longest_way_m(path_b, other.radius_m + other.centre_O_m.norm()));
+    return touches_sphere(
+        path_b.start * other.centre_O_m,
+        other.radius_m + displacement_bound_m(path_b, other.radius_m + other.centre_O_m.norm()));
   }
   return std::any_of(scene_.meshes().begin(), scene_.meshes().end(), [&](const MeshObstacle& obstacle) {
     return touches_sphere(obstacle.centre_W_m, obstacle.radius_m);

@@ -14,9 +14,6 @@ struct BodyPath {
   Pose start, end;
 };
 
-/// Upper bound on the way of a point of a body of this radius [m], METHOD (92). RT-safe.
-double longest_way_m(const BodyPath& path, double radius_m) noexcept;
-
 /// The pose at a fraction of the straight path between two poses. RT-safe.
 inline Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
   return {from.rotation.slerp(fraction, to.rotation),

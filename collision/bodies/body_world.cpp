@@ -90,7 +90,6 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
 void BodyWorld::place(std::size_t body, const BodyMotion& motion) noexcept {
   tool_was_moved_ = false;
   bodies_[body].motion = motion;
-  bodies_[body].last_way_m = 0.0;
   for (Body& one : bodies_) {
     one.asleep = false;
     one.calm_steps = 0;
@@ -166,9 +165,8 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
     tools_[0].load_W = {};
     save();
   }
-  bodies_before_[0] = {bodies_[0].motion, false, 0, bodies_[0].last_way_m};
+  bodies_before_[0] = {bodies_[0].motion, false, 0};
   time_before_s_ = time_s_;
-  bodies_[0].last_way_m = longest_way_m({bodies_[0].motion.X_WB, X_WT}, bodies_[0].radius_m);
   bodies_[0].motion.X_WB = X_WT;
   time_s_ = until_s;
   tools_[0].grasp_broke = false;
@@ -179,8 +177,7 @@ void BodyWorld::move_tool(const Pose& X_WT, double until_s) noexcept {
 /// Copies the state that take_back() restores.
 void BodyWorld::save() noexcept {
   bodies_before_.clear();
-  for (const Body& body : bodies_)
-    bodies_before_.push_back({body.motion, body.asleep, body.calm_steps, body.last_way_m});
+  for (const Body& body : bodies_) bodies_before_.push_back({body.motion, body.asleep, body.calm_steps});
   contacts_before_ = contacts_;  // equal capacities: no allocation
   time_before_s_ = time_s_;
   tools_before_ = tools_;
@@ -395,7 +392,6 @@ void BodyWorld::take_back() noexcept {
     bodies_[i].motion = bodies_before_[i].motion;
     bodies_[i].asleep = bodies_before_[i].asleep;
     bodies_[i].calm_steps = bodies_before_[i].calm_steps;
-    bodies_[i].last_way_m = bodies_before_[i].last_way_m;
   }
   contacts_ = contacts_before_;  // equal capacities: no allocation
   time_s_ = time_before_s_;
@@ -466,9 +462,7 @@ void BodyWorld::apply_impulses(std::size_t tool_of_step) noexcept {
     push(c.b, -1.0);
   }
   push_held();
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    Body& body = bodies_[i];
-    body.last_way_m = way_of_step_m(i);
+  for (Body& body : bodies_) {
     body.free.X_WB = body.X_WQ;
     body.motion = body.free;
   }

@@ -174,7 +174,6 @@ class BodyWorld {
     double weight_per_s2 = 0.0;    ///< kappa, 0: takes no part
     double fraction = 1.0;         ///< part of the step that the body tries
     bool shortened = false;        ///< tries a smaller part than its q is for
-    double last_way_m = 0.0;       ///< upper bound on the way of a point in the last step
     double step_s = 0.0;           ///< time that passes for the body [s]
     std::size_t island = 0;        ///< number of the body that represents its island
     bool touches = false;          ///< has a contact
@@ -274,10 +273,6 @@ class BodyWorld {
   bool sweep_pairs() noexcept;
   bool sweep_pair(BodyPair& pair) noexcept;
   SweepQuery::SweepResult sweep(BodyPair& pair, double clearance_m) noexcept;
-  double last_way_of_island_m(std::size_t body) const noexcept;
-  double way_of_step_m(std::size_t body) const noexcept {
-    return longest_way_m(path_of(body), bodies_[body].radius_m);
-  }
   bool is_shortened(std::size_t body) const noexcept {
     return body != BodyContact::kFixed && bodies_[body].shortened;
   }
@@ -316,7 +311,6 @@ class BodyWorld {
     BodyMotion motion;
     bool asleep;
     std::uint16_t calm_steps;
-    double last_way_m;
   };
   std::vector<BodyState> bodies_before_;      ///< before the last step
   std::vector<BodyContact> contacts_before_;  ///< before the last step

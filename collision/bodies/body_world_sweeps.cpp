@@ -16,9 +16,6 @@ constexpr double kNearby = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
-/// The first part of a path that is swept: this multiple of the longest way in the island in the last step
-/// and this distance, at least kLeastPart of the path. It then grows by the factor kLonger.
-constexpr double kFirstPart = 1.5, kFirstPart_m = 2e-4, kLeastPart = 1.0 / 1024.0, kLonger = 4.0;
 
 }  // namespace
 
@@ -73,37 +70,9 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
   return false;
 }
 
-/// Sweeps the paths of a pair. Of a long one a short part first, and then a longer one: most meet something
-/// soon. Contacts with obstacles that move are those at the end of the step, so there only the whole path
-/// counts.
+/// Sweeps the paths of a pair.
 SweepQuery::SweepResult BodyWorld::sweep(BodyPair& pair, double clearance_m) noexcept {
-  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
-  double part = 1.0;
-  for (const std::size_t i : {pair.a(), pair.b()})
-    if (i != BodyContact::kFixed && !pair.scene().has_moving_obstacles())
-      part = std::min(part, (kFirstPart * last_way_of_island_m(i) + kFirstPart_m) / way_of_step_m(i));
-  for (part = std::max(part, kLeastPart); part * kLonger < 1.0; part *= kLonger) {
-    const auto first_part = [part](const BodyPath& path) {
-      return BodyPath{path.start, between(path.start, path.end, part)};
-    };
-    const SweepQuery::SweepResult found =
-        pair.sweep(first_part(path_a), first_part(path_b), clearance_m, budget_, {time_s_, until_s_});
-    if (!found.complete || found.overlaps || !found.contacts.empty()) return found;
-  }
-  return pair.sweep(path_a, path_b, clearance_m, budget_, {time_s_, until_s_});
-}
-
-/// The longest way of a point of the island of a body in the last step, or of an obstacle that it touches in
-/// this one [m]: what touches a body may drive it.
-double BodyWorld::last_way_of_island_m(std::size_t body) const noexcept {
-  const std::size_t island = bodies_[body].island;
-  double longest_m = 0.0;
-  for (const Body& one : bodies_)
-    if (one.island == island) longest_m = std::max(longest_m, one.last_way_m);
-  for (const BodyContact& c : contacts_)
-    if (c.b == BodyContact::kFixed && bodies_[c.a].island == island)
-      longest_m = std::max(longest_m, other_displacement_m(c, geometry(c).point_W_m).norm());
-  return longest_m;
+  return pair.sweep(path_of(pair.a()), path_of(pair.b()), clearance_m, budget_, {time_s_, until_s_});
 }
 
 /// Adds contacts that a sweep did not name because the path meets known ones first. These are held open, but
@@ -114,8 +83,7 @@ bool BodyWorld::add_behind(BodyPair& pair) noexcept {
   for (const Contact& contact : behind.contacts) found_new = add_contact(pair, contact) || found_new;
   if (found_new) return true;
   if (behind.complete && !behind.overlaps && behind.contacts.empty()) {
-    pair.sweep(path_of(pair.a()), path_of(pair.b()), kClearance_m, budget_,
-               {time_s_, until_s_});  // for touches()
+    sweep(pair, kClearance_m);  // for touches()
     return false;
   }
   shorten(pair);
