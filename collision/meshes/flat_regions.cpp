@@ -11,7 +11,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::uint32_t kNone = HalfEdgeMesh::kNone;
+constexpr std::uint32_t kNoRegion = HalfEdgeMesh::kNone;
 
 /// The plane that fits a growing set of points best: the eigenvector of the smallest eigenvalue of their
 /// covariance.
@@ -50,7 +50,7 @@ class RegionGrowth {
         tolerance_m_(tolerance_m),
         area_normals_(mesh.face_count()),
         visit_(mesh.face_count(), 0) {
-    regions_.region_of_face.assign(mesh.face_count(), kNone);
+    regions_.region_of_face.assign(mesh.face_count(), kNoRegion);
     for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
       area_normals_[f] = (corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0));
   }
@@ -63,7 +63,7 @@ class RegionGrowth {
     std::stable_sort(largest_first.begin(), largest_first.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return areas[a] > areas[b]; });
     for (const std::uint32_t seed : largest_first)
-      if (regions_.region_of_face[seed] == kNone) add_region(seed);
+      if (regions_.region_of_face[seed] == kNoRegion) add_region(seed);
     return std::move(regions_);
   }
 
@@ -107,7 +107,7 @@ class RegionGrowth {
       use(f);
       for (std::uint32_t h = 3 * f; h < 3 * f + 3; ++h) {
         const std::uint32_t other = HalfEdgeMesh::face_of(mesh_.twin(h));
-        if (visit_[other] == visits_ || regions_.region_of_face[other] != kNone || !lies_in(plane, other))
+        if (visit_[other] == visits_ || regions_.region_of_face[other] != kNoRegion || !lies_in(plane, other))
           continue;
         visit_[other] = visits_;
         front_.push_back(other);
