@@ -140,8 +140,8 @@ class ConeProjection {
   std::vector<HalfSpace> suggested_;  ///< only their cones and normals
   std::vector<Unknown> unknowns_;     ///< of the Newton step for Coulomb's law
   Eigen::VectorXd z0_, z_, z_before_, rest_, r_, d_;
-  Range rest_range_;           ///< of rest_ after project_out()
-  std::vector<Range> ranges_;  ///< of the columns of Q_: a chain of bodies leaves most of them short
+  Range rest_range_;           ///< range of rest_ after project_out()
+  std::vector<Range> ranges_;  ///< range of each column of Q_; most are short in a chain of bodies
   Eigen::MatrixXd Q_;          ///< orthonormal columns
   Eigen::MatrixXd R_;          ///< upper triangle: active normals = Q R
   Eigen::MatrixXd J_;          ///< Jacobian of the Newton step for Coulomb's law

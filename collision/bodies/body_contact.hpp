@@ -30,9 +30,9 @@ struct BodyContact {
   double slip_m = 0.0;                         ///< length of the slip in the last step
   StaticVector<Vector3d, 4> active_normals;    ///< of its cone, at the last answer (ConeProjection)
   bool stays = false;                          ///< is not dropped in this step
-  /// Second derivative of the gap by the pose of the tool with this number of a body, which moves a or b: its
-  /// translation in W and its rotation in T. kFixed: not known in this step.
+  /// Body number of the tool whose `curvature` is known in this step. kFixed: none.
   std::size_t curvature_of = kFixed;
+  /// Second derivative of the gap by the translation of that tool in W and by its rotation in T.
   Matrix6d curvature;
 };
 

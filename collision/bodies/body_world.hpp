@@ -184,8 +184,9 @@ class BodyWorld {
     std::size_t tool = kNoTool;    ///< number of the tool that the body is
     std::size_t mover = 0;         ///< body whose unknowns move it: itself, or the tool that holds it
     Pose X_MB;                     ///< its pose in the frame of the mover
-    Vector6d newton_step, newton_step_before;  ///< of q: translation in W [m], rotation in B [rad]
-    Matrix6d root = Matrix6d::Identity();      ///< upper triangular root of the metric at q
+    Vector6d newton_step,
+        newton_step_before;  ///< last two changes of q: translation in W [m], rotation in B [rad]
+    Matrix6d root = Matrix6d::Identity();  ///< upper triangular root of the metric at q
   };
 
   /// A tool that a hand leads. A step changes it.

@@ -24,8 +24,8 @@
 #include "tests/support/random_values.hpp"
 
 // Boxes on a plane: wrenchd's free bodies beside other simulators, on the same scenes with the same step.
-// Time, overlap, drift and the errors against closed forms. Then bodies of fine meshes that a tool pushes,
-// which the others have not: their meshes are convex or soft, and no tool is led by a hand.
+// Time, overlap, drift and the errors against closed forms. Then the time of wrenchd alone for bodies of fine
+// meshes that a tool pushes.
 
 namespace {
 
@@ -309,7 +309,7 @@ std::string against_closed_form(const BoxScene& scene, const Figures& figures) {
 struct PushedBodies {
   std::string name, kind;
   std::uint32_t triangles;
-  double pressed_m;  ///< how far the hand goes below the height at which the tool touches a body that lies
+  double pressed_m;  ///< depth of the hand below the height at which the tool touches a body that lies
 };
 
 struct PushFigures {
@@ -317,7 +317,7 @@ struct PushFigures {
   std::size_t contacts = 0, unfinished = 0;
 };
 
-/// Runs eight random hands for some seconds each: they sink at 50 mm/s and move about in a circle of 30 mm.
+/// Runs eight random hands for some seconds each: they sink at 50 mm/s and swing by up to 30 mm.
 PushFigures push(const PushedBodies& given, double seconds, const CounterScale& scale) {
   const bool is_cube = given.kind == "box";
   const auto mesh = [&](std::uint32_t seed) {
