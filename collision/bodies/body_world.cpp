@@ -16,8 +16,6 @@ constexpr double kOpening = 0.01;
 /// Distance that bodies_are_out_of_reach() adds to the reach of the tool [m]. It is larger than the clearance
 /// and than rounding.
 constexpr double kReachMargin_m = 1e-6;
-/// A hand that is farther from its tool does not move it [m]: rounding would be larger than the clearance.
-constexpr double kFarthestHand_m = 1e5;
 /// A body whose fastest point moves more slowly than this [m/s] for this number of steps may fall asleep.
 /// What begins to slide or to topple is faster within a few steps.
 constexpr double kCalmSpeed_m_per_s = 1e-5;
@@ -260,8 +258,6 @@ void BodyWorld::set_goal(Body& body) noexcept {
     body.free = body.motion;
     if (body.weight_per_s2 == 0.0) return hold(body);
     const Pose X_goal = tool_goal(tools_[body.tool]);
-    if (!((X_goal.translation_m - body.motion.X_WB.translation_m).norm() < kFarthestHand_m))
-      return hold(body);
     body.X_goal = body.fraction < 1.0 ? between(body.motion.X_WB, X_goal, body.fraction) : X_goal;
   } else {
     body.step_s = body.fraction * dt_s_;

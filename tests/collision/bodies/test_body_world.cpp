@@ -313,19 +313,6 @@ TEST_CASE("a step neither allocates nor locks", "[body_world]") {
   CHECK(guard.locks() == 0);
 }
 
-TEST_CASE("a hand that is infinitely far away does not hold a step up", "[body_world]") {
-  const Scene scene = table();
-  BodyWorld world(scene, {body_at({0.0, 0.0, 0.0251}, cube())}, {});
-  BodyWorld::Hand hand;
-  hand.X_WP.translation_m = {0.0, 0.0, 0.09};
-  world.enter_tool(0, hand.X_WP);
-  for (int k = 0; k < 20; ++k) world.step(hand, kStep_s);
-  hand.X_WP.translation_m = {0.0, 0.0, -1e200};  // the square of this distance is infinite
-  for (int k = 0; k < 20; ++k) world.step(hand, kStep_s);
-  CHECK(world.motion(0).X_WB.translation_m.z() > 0.05);
-  CHECK(world.motion(1).X_WB.translation_m.z() > 0.0249);
-}
-
 TEST_CASE("with its work used up a world stays as it was and is admissible", "[body_world]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.emplace_back("plate", MeshBvh(make_mesh({"box", 12, 1, {0.4, 0.4, 0.02}})),
