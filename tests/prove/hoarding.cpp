@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <optional>
 #include <stdexcept>
@@ -16,13 +15,13 @@
 #include "daemon/control/control_socket.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "tests/prove/abused_daemon.hpp"
+#include "tests/prove/other_user.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/support/recording_mutation.hpp"
 
 namespace wrenchd::test {
 namespace {
 
-constexpr uid_t kOtherUser = 65533;
 constexpr const char* kSecret = "root:$6$sEcReT:19000:0:99999:7:::";
 constexpr double kMostEnd_ms = 2000.0;
 /// Descriptors of a daemon that nobody exhausts, with room.
@@ -52,45 +51,6 @@ std::optional<Json> reply_to(int fd, const std::string& line) {
   }
   return Json::parse(text.substr(0, text.find('\n')));
 }
-
-/// A process of another user. It sends numbers back.
-class OtherUser {
- public:
-  using Report = std::function<void(long)>;
-  OtherUser(uid_t user, const std::function<void(const Report&)>& work) {
-    if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
-      throw std::system_error(errno, std::generic_category(), "pipe");
-    pid_ = ::fork();
-    if (pid_ == 0) {
-      ::close(pipe_[0]);
-      if (become(user)) try {
-          work([this](long number) {
-            [[maybe_unused]] const auto n = ::write(pipe_[1], &number, sizeof number);
-          });
-        } catch (const std::exception&) {
-        }
-      ::_exit(0);
-    }
-    ::close(pipe_[1]);
-  }
-  ~OtherUser() {
-    ::close(pipe_[0]);
-    if (pid_ > 0) ::kill(pid_, SIGKILL), ::waitpid(pid_, nullptr, 0);
-  }
-  OtherUser(const OtherUser&) = delete;
-  OtherUser& operator=(const OtherUser&) = delete;
-
-  /// Returns the next number; nothing if the process has ended.
-  std::optional<long> next() {
-    long number = 0;
-    if (::read(pipe_[0], &number, sizeof number) == sizeof number) return number;
-    return {};
-  }
-
- private:
-  std::array<int, 2> pipe_{};
-  pid_t pid_ = -1;
-};
 
 long descriptors_of(pid_t pid) {
   std::error_code error;

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <memory>
-#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -19,22 +15,16 @@
 
 #include <CLI/CLI.hpp>
 #include <fcntl.h>
-#include <grp.h>
-#include <poll.h>
-#include <spawn.h>
-#include <sys/resource.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <sys/wait.h>
 #include <unistd.h>
 #include <wrenchd/client.hpp>
-#include <wrenchd/state_reader.hpp>
 
 #include "daemon/control/json_rpc.hpp"
-#include "daemon/control/listening_socket.hpp"
 #include "daemon/recording/recording_file.hpp"
 #include "tests/prove/abused_daemon.hpp"
+#include "tests/prove/abusers.hpp"
 #include "tests/prove/hoarding.hpp"
+#include "tests/prove/signal_walk.hpp"
+#include "tests/prove/stop_latency.hpp"
 #include "tests/support/machine_load.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -45,6 +35,8 @@
 // in one recording, so other load affects them equally. Tick durations and wake latencies come from the
 // recording.
 //
+// Then a user without a role stops the armed loop during each kind of abuse (stop_latency.hpp).
+//
 // Further daemons follow: one whose log and live line nobody reads; one for each signal, which must run on or
 // release the hand before it ends; and one that clients try to exhaust (hoarding.hpp).
 
@@ -52,147 +44,6 @@ namespace {
 
 using namespace wrenchd;
 using namespace wrenchd::test;
-
-/// One kind of abuse, repeated until `stop` is set.
-using Abuse = void (*)(const fs::path& path, const std::atomic<bool>& wanted);
-
-void floods_requests(const fs::path& path, const std::atomic<bool>& wanted) {
-  const OwnedFd fd = connected(path);
-  std::string many;
-  for (int i = 0; i < 50; ++i) many += request("describe");
-  while (wanted && fd && send_bytes(fd.get(), many)) drain(fd.get());
-}
-
-void never_reads(const fs::path& path, const std::atomic<bool>& wanted) {
-  const OwnedFd fd = connected(path);
-  const std::string line = request("subscribe") + request("status") + request("describe");
-  while (wanted && fd && send_bytes(fd.get(), line)) {
-  }
-}
-
-void floods_rubbish(const fs::path& path, const std::atomic<bool>& wanted) {
-  const OwnedFd fd = connected(path);
-  const std::string rubbish = std::string(40000, '[') + "\n{\"jsonrpc\":\"2.0\",\n\xff\xfe\n";
-  while (wanted && fd && send_bytes(fd.get(), rubbish)) drain(fd.get());
-}
-
-void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
-  const std::string piece(65536, 'x');
-  while (wanted) {
-    const OwnedFd fd = connected(path);
-    if (!fd) return;
-    for (int i = 0; i < 1600 && wanted && send_bytes(fd.get(), piece); ++i) {
-    }
-  }
-}
-
-void connects(const fs::path& path, const std::atomic<bool>& wanted) {
-  std::vector<OwnedFd> kept;
-  while (wanted) {
-    kept.push_back(connected(path));
-    if (kept.size() > 50) kept.clear();
-    std::this_thread::sleep_for(100us);
-  }
-}
-
-void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
-  const OwnedFd fd = connected(path);
-  const std::string line =
-      request("devices") + request("arm") + request("lease.heartbeat") + request("lease.release");
-  while (wanted && fd && send_bytes(fd.get(), line)) drain(fd.get());
-}
-
-constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
-                                          endless_line,    connects,    asks_for_all};
-
-/// Runs the abusers in a separate process.
-class Abusers {
- public:
-  /// uid: the user of the abusers, if this process may change its user.
-  Abusers(const fs::path& path, int threads, uid_t uid) {
-    if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
-      throw std::system_error(errno, std::generic_category(), "pipe");
-    pid_ = ::fork();
-    if (pid_ == 0 && become(uid)) live(path, threads);
-    if (pid_ == 0) ::_exit(1);
-    ::close(pipe_[0]);
-  }
-  ~Abusers() {
-    ::close(pipe_[1]);
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Abusers(const Abusers&) = delete;
-  Abusers& operator=(const Abusers&) = delete;
-
-  void begin() { tell('b'); }
-  void end() { tell('e'); }
-
- private:
-  void tell(char what) { [[maybe_unused]] const ssize_t n = ::write(pipe_[1], &what, 1); }
-
-  [[noreturn]] void live(const fs::path& path, int threads) {
-    ::close(pipe_[1]);
-    std::atomic<bool> wanted{false};
-    for (int i = 0; i < threads; ++i)
-      std::thread([&wanted, path, i] {
-        while (true) {
-          while (!wanted) std::this_thread::sleep_for(1ms);
-          kAbuses[static_cast<std::size_t>(i) % kAbuses.size()](path, wanted);
-          std::this_thread::sleep_for(1ms);
-        }
-      }).detach();
-    for (char what = 0; ::read(pipe_[0], &what, 1) == 1;) wanted = what == 'b';
-    ::_exit(0);
-  }
-
-  std::array<int, 2> pipe_{};
-  pid_t pid_ = -1;
-};
-
-/// An unrelated socket in a separate process, which accepts every connection and reads all input.
-class Decoy {
- public:
-  explicit Decoy(const fs::path& path) : listens_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.native().copy(address.sun_path, sizeof address.sun_path - 1);
-    if (::bind(listens_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::listen(listens_.get(), 64) != 0)
-      throw std::system_error(errno, std::generic_category(), path.string());
-    fs::permissions(path, fs::perms::all);
-    pid_ = ::fork();
-    if (pid_ == 0) live();
-  }
-  ~Decoy() {
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Decoy(const Decoy&) = delete;
-  Decoy& operator=(const Decoy&) = delete;
-
- private:
-  [[noreturn]] void live() const {
-    std::vector<pollfd> peers = {{listens_.get(), POLLIN, 0}};
-    std::array<char, 65536> bytes;
-    while (::poll(peers.data(), peers.size(), -1) > 0 || errno == EINTR) {
-      for (std::size_t i = peers.size() - 1; i > 0; --i) {
-        if (peers[i].revents == 0) continue;
-        const ssize_t got = ::recv(peers[i].fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
-        if (got > 0 || (got < 0 && errno == EAGAIN)) continue;
-        ::close(peers[i].fd);
-        peers.erase(peers.begin() + static_cast<std::ptrdiff_t>(i));
-      }
-      if (peers[0].revents == 0) continue;
-      const int peer = ::accept4(listens_.get(), nullptr, nullptr, SOCK_CLOEXEC);
-      if (peer >= 0) peers.push_back({peer, POLLIN, 0});
-    }
-    ::_exit(1);
-  }
-
-  OwnedFd listens_;
-  pid_t pid_ = -1;
-};
 
 /// Keeps the lease on its own connection and thread. Acquires the lease again if it is lost.
 class Holder {
@@ -244,87 +95,6 @@ class Holder {
   long lost_ = 0, wronged_ = 0;
   std::jthread thread_;
 };
-
-/// An armed daemon that gets a signal. The memory with its ticks outlives the daemon, so that the last tick
-/// shows whether the hand was released.
-class Signalled {
- public:
-  Signalled(const std::string& program, const fs::path& directory, int signal)
-      : signal_(signal),
-        socket_(directory / ("signal-" + std::to_string(signal) + ".sock")),
-        daemon_(program, {"--realtime", "off", "--arm", "--control", socket_},
-                directory / ("signal-" + std::to_string(signal) + ".log")) {}
-
-  /// Waits for force, and sends the signal. Returns false if the loop is not armed in time, or has latched a
-  /// fault, as on a busy machine.
-  bool send() try {
-    const auto end = std::chrono::steady_clock::now() + 20s;
-    while (!connected(socket_) && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(5ms);
-    client_.emplace(socket_);
-    reader_.emplace(client_->open_state());
-    while (client_->state() != "active") {
-      if (client_->state() == "fault" || std::chrono::steady_clock::now() > end) return false;
-      std::this_thread::sleep_for(5ms);
-    }
-    daemon_.signal(signal_);
-    return true;
-  } catch (const ClientError&) {  // the daemon did not open its socket in time
-    return false;
-  }
-  /// Returns whether the daemon still runs, or has released the hand before it ended.
-  bool is_safe() {
-    if (!daemon_.ends_within(1s)) return ++survived, true;
-    TickState newest;
-    try {
-      while (reader_->next(newest, 0ms)) {
-      }
-    } catch (const ClientError&) {  // the daemon has ended
-    }
-    return newest.state() == "shutdown" && newest.integer("released") == 1 &&
-           newest.integer("motors_commanded") == 0;
-  }
-  int signal() const { return signal_; }
-
-  static inline long survived = 0;  ///< daemons that ran on
-
- private:
-  int signal_;
-  fs::path socket_;
-  Daemon daemon_;
-  std::optional<Client> client_;
-  std::optional<StateReader> reader_;
-};
-
-struct Walk {
-  long signals = 0, survived = 0, not_armed = 0, unreleased = 0;
-};
-
-/// Sends every signal to an armed daemon, a few daemons at a time.
-Walk walk_signals(const std::string& program, const fs::path& directory) {
-  constexpr std::size_t kAtOnce = 4;
-  Walk walk;
-  std::vector<int> all;
-  for (int signal = 1; signal <= SIGRTMAX; ++signal)
-    if (signal != SIGKILL && signal != SIGSTOP && (signal <= SIGSYS || signal >= SIGRTMIN))
-      all.push_back(signal);
-  for (std::size_t begin = 0; begin < all.size(); begin += kAtOnce) {
-    std::vector<std::unique_ptr<Signalled>> some;
-    for (std::size_t i = begin; i < std::min(begin + kAtOnce, all.size()); ++i)
-      some.push_back(std::make_unique<Signalled>(program, directory, all[i]));
-    for (auto& one : some)
-      if (!one->send()) one.reset(), ++walk.not_armed;
-    for (auto& one : some) {
-      if (!one) continue;
-      ++walk.signals;
-      if (one->is_safe()) continue;
-      ++walk.unreleased;
-      std::fprintf(stderr, "prove_abuse: signal %d ended the daemon, and the hand was not released\n",
-                   one->signal());
-    }
-  }
-  walk.survived = Signalled::survived;
-  return walk;
-}
 
 struct StalledReader {
   double slowest_status_ms = 0.0, stop_ms = 0.0, end_ms = 0.0;
@@ -382,6 +152,26 @@ struct Times {
   }
 };
 
+/// Every user may observe, so that abusers without any role can use every method that reads.
+constexpr const char* kConfig = R"([limits]
+soft_start_s = 0.25
+[simulation]
+hand_script = "hand.toml"
+[control]
+observers = "*"
+)";
+
+/// Presses the cube on the table and lifts it, often, so that an armed loop soon has force.
+constexpr const char* kHand = R"(
+waypoint = [
+  { time_s = 0.0, position_m = [0.0, 0.0, 0.028] },
+  { time_s = 0.6, position_m = [0.0, 0.0, 0.028] },
+  { time_s = 0.8, position_m = [0.0, 0.0, 0.020] },
+  { time_s = 1.2, position_m = [0.0, 0.0, 0.020] },
+  { time_s = 1.4, position_m = [0.0, 0.0, 0.028] },
+]
+)";
+
 /// Longest time from SIGTERM to the end of the daemon.
 constexpr double kMostEnd_ms = 2000.0;
 
@@ -396,7 +186,7 @@ int main(int argc, char** argv) {
   long slices = 10;
   double slice_s = 1.0;
   std::uint64_t seed = 1;
-  int threads = 12;
+  int threads = 12, stops = 3;
   std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "wrenchd").string();
   app.add_option("--slices", slices, "number of rounds with an idle, a busy and an abused slice each")
       ->check(CLI::Range(1L, 1000000L))
@@ -407,14 +197,17 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "number of abusing threads")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();
+  app.add_option("--stops", stops, "emergency stops during each kind of abuse")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
   app.add_option("--seed", seed, "seed of the order within a round")->capture_default_str();
   app.add_option("--wrenchd", program, "path of the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
     const test::TemporaryDirectory files;
     const fs::path socket = files.path() / "control.sock", recording = files.path() / "run.h5";
-    // Every user may observe, so that abusers without any role can use every method that reads.
-    const fs::path config = files.write("wrenchd.toml", "[control]\nobservers = \"*\"\n");
+    files.write("hand.toml", kHand);
+    const fs::path config = files.write("wrenchd.toml", kConfig);
     fs::permissions(files.path(), fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
     Daemon daemon(
         program,
@@ -466,22 +259,14 @@ int main(int argc, char** argv) {
       }
     }
     holder.end();
-    // An emergency stop by an unprivileged user during the abuse.
-    abusers.begin();
-    std::this_thread::sleep_for(200ms);
-    const auto stop_requested = std::chrono::steady_clock::now();
-    watcher.call("stop");
-    const double stop_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_requested).count();
-    abusers.end();
-    std::this_thread::sleep_for(100ms);
-    if (watcher.state() != "stopped") violation("stop did not stop it");
+    const std::vector<StopRequest> stop_requests = request_stops(socket, abusers, stops);
     if (daemon.end() == -1) violation("the daemon ended by a signal");
     const StalledReader stalled = stall_reader(program, files.path());
     if (stalled.end_ms > kMostEnd_ms && violations == 0) test::MachineLoad().throw_if_busy();
     if (stalled.end_ms > kMostEnd_ms) violation("a stalled reader of the log delays the end of the daemon");
-    const Walk walk = walk_signals(program, files.path());
-    violations += walk.unreleased;
+    const SignalWalk walk = walk_signals(program, config, files.path());
+    for (const int signal : walk.unreleased)
+      violation("signal " + std::to_string(signal) + " ended the daemon, and the hand was not released");
     const Hoarding hoarding = hoard(program, files.path());
     for (const std::string& what : hoarding.violations) violation(what);
     // The daemon shares the machine, so it may receive a timely heartbeat late. The abusers are idle by now,
@@ -492,7 +277,8 @@ int main(int argc, char** argv) {
     }
 
     std::array<Times, kKinds> times;
-    for (const TickRecord& record : read_recording(recording).ticks)
+    const std::vector<TickRecord> ticks = read_recording(recording).ticks;
+    for (const TickRecord& record : ticks)
       for (const Slice& slice : done)
         if (record.now_ns >= slice.begin_ns && record.now_ns < slice.end_ns) {
           std::int64_t took_ns = 0;
@@ -500,6 +286,13 @@ int main(int argc, char** argv) {
           times[slice.kind].tick_us.push_back(1e-3 * static_cast<double>(took_ns));
           times[slice.kind].late_us.push_back(1e-3 * static_cast<double>(record.wake_latency_ns));
         }
+    for (std::size_t kind = 0; kind <= kAbuseNames.size(); ++kind) {
+      const StopLatency stop = stop_latency(stop_requests, kind, ticks);
+      if (stop.missed > 0) violation("a stop of a user without a role did not stop the loop");
+      std::printf("stops_while_%s stops %ld missed %ld p50_ms %.1f max_ms %.1f\n",
+                  kind < kAbuseNames.size() ? kAbuseNames[kind] : "all", stop.stops, stop.missed, stop.p50_ms,
+                  stop.max_ms);
+    }
     constexpr std::array<const char*, kKinds> kNames = {"quiet", "busy", "abused"};
     std::printf("abuse");
     for (std::size_t kind = 0; kind < kKinds; ++kind) {
@@ -509,18 +302,19 @@ int main(int argc, char** argv) {
                   Times::quantile(tick_us, 0.999), kNames[kind], Times::quantile(late_us, 0.999));
     }
     std::printf(
-        " signals %ld survived %ld not_armed %ld unreleased %ld stalled_status_ms %.1f stalled_stop_ms %.1f "
+        " signals %ld survived %ld not_armed %ld unreleased %zu stalled_status_ms %.1f stalled_stop_ms %.1f "
         "stalled_end_ms %.1f",
-        walk.signals, walk.survived, walk.not_armed, walk.unreleased, stalled.slowest_status_ms,
+        walk.signals, walk.survived, walk.not_armed, walk.unreleased.size(), stalled.slowest_status_ms,
         stalled.stop_ms, stalled.end_ms);
     std::printf(
         " fds %ld fd_stop_ms %.1f starved %ld asked %ld races %ld adds %ld leaks %ld big_mesh_end_ms %.0f",
         hoarding.most_fds, hoarding.stop_ms, hoarding.refused, hoarding.asked, hoarding.swaps, hoarding.adds,
         hoarding.leaks, hoarding.end_ms);
     std::printf(
-        " slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld violations %ld seed "
+        " slowest_answer_ms %.1f longest_beat_ms %.1f "
+        "lost_leases %ld violations %ld seed "
         "%llu\n",
-        slowest_answer_ms, stop_ms, holder.worst_ms(), holder.lost(), violations,
+        slowest_answer_ms, holder.worst_ms(), holder.lost(), violations,
         static_cast<unsigned long long>(seed));
     return violations == 0 ? 0 : 1;
   } catch (const test::TooBusy& busy) {
