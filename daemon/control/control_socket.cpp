@@ -19,7 +19,8 @@
 #include "daemon/thread_guard.hpp"
 
 // A round: wait for input; accept new clients; then serve each client, the one with the most tokens first:
-// read, process a few lines, send replies and events. At its end the round checks the lease.
+// read, process a few lines, send replies and events. At its end the round checks the lease. A round that
+// takes long ends before it has served all: those that are left have the most tokens in the next one.
 
 namespace wrenchd {
 namespace {
@@ -27,6 +28,8 @@ namespace {
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWake = 1;
 constexpr int kAcceptPerRound = 16;
+/// A client with tokens, as one that requests a stop, waits for one round at most.
+constexpr Duration kLongestRound = std::chrono::milliseconds(2);
 /// Pause before the next accept() if the process has no free descriptors.
 constexpr Duration kAcceptPause = std::chrono::milliseconds(100);
 /// Pause before the next attempt if the kernel accepts no descriptor: too many are unread.
@@ -134,8 +137,11 @@ void ControlSocket::run(const std::stop_token& stop) {
     for (auto& [number, client] : clients_) turns.push_back(&client);
     std::stable_sort(turns.begin(), turns.end(),
                      [](const Client* a, const Client* b) { return a->tokens > b->tokens; });
-    for (Client* client : turns)
+    round_is_cut_ = false;
+    for (Client* client : turns) {
+      if (round_is_cut_ = client != turns.front() && wall_now() - now > kLongestRound; round_is_cut_) break;
       if (!guard.run([&] { serve(*client, now); })) client->to_remove = true;
+    }
     guard.run([&] { lease_.check(wall_now()); });
     guard.run([&] { remove_clients(); });
   }
@@ -144,6 +150,7 @@ void ControlSocket::run(const std::stop_token& stop) {
 
 /// Returns the time until the next action that no descriptor triggers [ms]; -1: none.
 int ControlSocket::wait_ms(TimePoint now) const {
+  if (round_is_cut_) return 0;
   TimePoint until = lease_.next_check_at();
   if (accept_again_at_ > now) until = std::min(until, accept_again_at_);
   for (const auto& [number, client] : clients_) {

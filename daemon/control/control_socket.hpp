@@ -146,6 +146,7 @@ class ControlSocket {
   OwnedFd wake_fd_;
   std::map<std::uint64_t, Client> clients_;
   std::uint64_t last_client_number_ = 1;  ///< 0 is the listening socket, 1 the wake-up descriptor
+  bool round_is_cut_ = false;             ///< the last round ended before it had served every client
   TimePoint accept_again_at_{};           ///< the process had no free descriptors: accept no client before
 
   std::mutex finished_mutex_;

@@ -617,6 +617,28 @@ TEST_CASE("a slow method blocks no other client, and its response follows when i
   CHECK(next_code(another) == 0);
 }
 
+TEST_CASE("a request waits for one of the clients whose requests take long, not for all of them",
+          "[control_socket]") {
+  std::atomic<int> done{0};
+  const MethodRow work{"test.work", Role::observer, {}, "Takes 5 ms.", [&done](const Json&, const Caller&) {
+                         std::this_thread::sleep_for(5ms);
+                         return MethodResult(Json{{"done", ++done}});
+                       }};
+  ControlRig rig(resting_config(), {work});
+  std::vector<std::unique_ptr<RigClient>> busy;
+  constexpr int kClients = 12, kRequests = 60;
+  for (int i = 0; i < kClients; ++i) {
+    busy.push_back(std::make_unique<RigClient>(rig.path(), 8000U + static_cast<uid_t>(i)));
+    for (int k = 0; k < kRequests; ++k) busy.back()->send(request("test.work"));
+  }
+  RigClient client = rig.connect(TestUser::observer);
+  CHECK(client.error_code("status") == 0);
+  const int before = done;
+  CHECK(client.error_code("status") == 0);
+  CHECK(done - before <= 2 * kLinesPerRound);
+  CHECK(done < kClients * kRequests);  // the clients were still busy
+}
+
 TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
   std::array<int, 2> ends{};
   REQUIRE(::pipe2(ends.data(), O_CLOEXEC) == 0);
