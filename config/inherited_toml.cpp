@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/files/absolute_name.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -52,7 +54,7 @@ fs::path parent_of(const std::string& name, const SourceLocation& place, const s
   bool only_in_chain = false;
   std::string searched;
   for (const fs::path& candidate : candidates(name, chain.back(), search)) {
-    searched += (searched.empty() ? "" : ", ") + fs::absolute(candidate).lexically_normal().string();
+    searched += (searched.empty() ? "" : ", ") + absolute_name(candidate).string();
     std::error_code error;
     if (!fs::exists(candidate, error)) continue;
     const bool in_chain = std::any_of(chain.begin(), chain.end(),

@@ -12,6 +12,7 @@
 #include "config/near_file.hpp"
 #include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
+#include "core/files/absolute_name.hpp"
 #include "core/friction.hpp"
 #include "core/generated_mesh.hpp"
 
@@ -92,7 +93,7 @@ void read_mesh(const TomlValue& value, const SceneReading& reading, fs::path& me
   if (fs::is_regular_file(mesh, ignored)) return;
   const fs::path near = reading.scope.restricted() ? fs::path() : near_file(mesh);
   value.reject(
-      "no such file; searched " + fs::absolute(mesh).lexically_normal().string() +
+      "no such file; searched " + absolute_name(mesh).string() +
       (near.empty()
            ? "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as "
              "in { make = \"gear\" }"

@@ -6,6 +6,7 @@
 #include "config/config_error.hpp"
 #include "config/near_file.hpp"
 #include "config/toml_files.hpp"
+#include "core/files/absolute_name.hpp"
 
 namespace wrenchd {
 namespace fs = std::filesystem;
@@ -54,7 +55,7 @@ fs::path SearchPath::require(const fs::path& name) const {
 std::string SearchPath::searched(const fs::path& name, const fs::path& named_in) const {
   std::string places;
   for (const fs::path& place : candidates(name, named_in)) {
-    places += (places.empty() ? "" : ", ") + fs::absolute(place).lexically_normal().string();
+    places += (places.empty() ? "" : ", ") + absolute_name(place).string();
   }
   return "no such file; searched " + places;
 }

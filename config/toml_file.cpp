@@ -10,6 +10,7 @@
 #include <toml++/toml.h>
 
 #include "config/near_file.hpp"
+#include "core/files/absolute_name.hpp"
 
 namespace wrenchd {
 namespace {
@@ -29,7 +30,7 @@ constexpr std::ptrdiff_t kMaxDotsInLine = 120;
 /// Names a file of a similar name only if the name comes from a user of this process, not from a client.
 std::string missing_text(const fs::path& file, const FileScope& scope) {
   const fs::path near = scope.restricted() ? fs::path() : near_file(file);
-  return "no such file; searched " + fs::absolute(file).string() +
+  return "no such file; searched " + absolute_name(file).string() +
          (near.empty() ? "" : "; did you mean '" + near.string() + "'?");
 }
 

@@ -15,6 +15,7 @@
 #include "config/nearest_key.hpp"
 #include "config/search_path.hpp"
 #include "config/toml_file.hpp"
+#include "core/files/absolute_name.hpp"
 #include "core/generated_mesh.hpp"
 #include "tools/daemon_call.hpp"
 
@@ -59,7 +60,7 @@ bool is_kind_of_mesh(const std::string& name) {
 /// Returns the path of a file in the working directory or on the search path.
 std::string mesh_file(const std::string& name) {
   std::error_code ignored;
-  if (fs::exists(name, ignored)) return fs::absolute(name).lexically_normal().string();
+  if (fs::exists(name, ignored)) return absolute_name(name).string();
   const SearchPath search;
   if (const auto found = search.find(name)) return found->string();
   std::vector<std::string> kinds = {kHalfSpace};
@@ -164,7 +165,7 @@ void load(Client& client, const std::string& file, const ControlOptions& options
 /// A file in the working directory, else a name that the daemon searches; "peg" is scenes/peg.toml there.
 std::string scene_name(const std::string& name) {
   std::error_code ignored;
-  if (fs::exists(name, ignored)) return fs::absolute(name).lexically_normal().string();
+  if (fs::exists(name, ignored)) return absolute_name(name).string();
   const fs::path path(name);
   return path.has_parent_path() || path.has_extension() ? name : "scenes/" + name + ".toml";
 }

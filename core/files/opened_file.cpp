@@ -12,6 +12,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "core/files/absolute_name.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -41,10 +43,6 @@ class Descriptor {
  private:
   int fd_;
 };
-
-fs::path absolute_name(const fs::path& file) {
-  return fs::absolute(file).lexically_normal();
-}
 
 /// Opens a path beneath a directory by openat2(2). Returns -1 with errno; ENOSYS if the kernel lacks it.
 int open_by_kernel(int directory, const fs::path& beneath) {

@@ -56,7 +56,8 @@ void make_recordings_directory(const fs::path& directory) {
   std::error_code error;
   if (fs::is_directory(directory, error)) return;
   fs::create_directories(directory, error);
-  if (!fs::is_directory(directory))
+  std::error_code ignored;
+  if (!fs::is_directory(directory, ignored))
     throw RecordingError(directory.string() + ": cannot be created (" + error.message() +
                          "); create it, or set directory in [recording] to a writable one");
   fs::permissions(directory, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec, error);

@@ -110,6 +110,9 @@ TEST_CASE("the directory of recordings is created, or rejected with a remedy", "
   CHECK(std::filesystem::status(files.path() / "a/b").permissions() ==
         (perms::owner_all | perms::group_read | perms::group_exec));  // nothing for others
   const auto file = files.write("file", "");
+  std::filesystem::create_symlink("itself", files.path() / "itself");
+  CHECK_THROWS_WITH(make_recordings_directory(files.path() / "itself"),
+                    Contains("set directory in [recording]"));
   CHECK_THROWS_WITH(make_recordings_directory(file / "below"),
                     Contains("cannot be created") && Contains("set directory in [recording]"));
 }
