@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/toml_file.hpp"
+#include "core/files/absolute_name.hpp"
 
 namespace wrenchd {
 namespace {
@@ -36,9 +37,7 @@ std::string array(const Vector3d& v) {
 }
 
 std::string quoted_file(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::path absolute = std::filesystem::absolute(file, error);
-  return quoted((error ? file : absolute.lexically_normal()).string());
+  return quoted(absolute_name(file).string());
 }
 
 std::string parts_line(const std::vector<std::filesystem::path>& parts) {

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "core/files/absolute_name.hpp"
 #include "daemon/guide_line.hpp"
 #include "daemon/hand_file.hpp"
 #include "daemon/option_checks.hpp"
@@ -109,7 +110,7 @@ void apply_playback(const Options& options, SimulationSettings& simulation) {
   if (options.playback_mode == "open") simulation.playback_mode = PlaybackMode::open;
   if (options.playback_mode == "closed") simulation.playback_mode = PlaybackMode::closed;
   if (!options.playback.empty()) {
-    simulation.playback = std::filesystem::absolute(options.playback).lexically_normal();
+    simulation.playback = absolute_name(options.playback);
     simulation.playback_path = read_playback(simulation.playback);
   } else if (!options.playback_mode.empty() && simulation.playback.empty()) {
     throw std::runtime_error("--playback-mode: there is no playback file; name one with --playback");

@@ -11,6 +11,7 @@
 #include "config/near_file.hpp"
 #include "config/scene_text.hpp"
 #include "config/second_hand.hpp"
+#include "core/files/absolute_name.hpp"
 #include "core/watch_limits.hpp"
 #include "daemon/hand_file.hpp"
 #include "daemon/recording/playback.hpp"
@@ -21,13 +22,13 @@ namespace {
 
 /// Returns the file in the working directory, else in the search path. Throws ConfigError if there is none.
 std::filesystem::path find_file(const std::filesystem::path& name, const SearchPath& search) {
-  auto given = std::filesystem::absolute(name);
+  const std::filesystem::path given = absolute_name(name);
   std::error_code error;
   if (std::filesystem::exists(given, error)) return given;
   if (const auto found = search.find(name)) return *found;
   const std::filesystem::path near = near_file(name);
   throw ConfigError(name, {},
-                    search.searched(name) + ", and from here " + given.lexically_normal().string() +
+                    search.searched(name) + ", and from here " + given.string() +
                         (near.empty() ? search.advice(name) : "; did you mean '" + near.string() + "'?"));
 }
 

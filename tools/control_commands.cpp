@@ -20,6 +20,7 @@
 #include <wrenchd/client.hpp>
 
 #include "config/nearest_key.hpp"
+#include "core/files/absolute_name.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/owned_fd.hpp"
 #include "tools/daemon_call.hpp"
@@ -265,8 +266,7 @@ void run_record(const ControlOptions& options) {
   Json params = Json::object();
   if (!options.file.empty()) {  // the user's path is relative to this process, not to the daemon
     const bool is_name = options.file.find('/') == std::string::npos;
-    params["file"] =
-        is_name ? options.file : std::filesystem::absolute(options.file).lexically_normal().string();
+    params["file"] = is_name ? options.file : absolute_name(options.file).string();
   }
   Client client(options.socket, kResponseTimeout);
   const Json result = call(client, "record." + options.method, params);

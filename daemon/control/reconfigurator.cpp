@@ -12,6 +12,7 @@
 #include "config/scene_text.hpp"
 #include "config/search_path.hpp"
 #include "config/setting_table.hpp"
+#include "core/files/absolute_name.hpp"
 #include "core/finite.hpp"
 #include "daemon/control/scene_cost.hpp"
 
@@ -172,7 +173,7 @@ FileScope Reconfigurator::client_scope() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::filesystem::path> directories = SearchPath().directories();
   for (const std::filesystem::path& file : {file_settings_.file, file_settings_.scene})
-    if (!file.empty()) directories.push_back(std::filesystem::absolute(file).parent_path());
+    if (!file.empty()) directories.push_back(absolute_name(file).parent_path());
   return FileScope::beneath(directories);
 }
 

@@ -7,6 +7,7 @@
 
 #include <pthread.h>
 
+#include "core/files/absolute_name.hpp"
 #include "daemon/hand_file.hpp"
 #include "daemon/recording/recording_directory.hpp"
 #include "daemon/runtime.hpp"
@@ -106,9 +107,10 @@ std::filesystem::path Recordings::start(const std::string& requested, bool anywh
 
 void Recordings::start_file(const std::filesystem::path& file) {
   // The working directory may be removed while the recording runs.
-  const std::filesystem::path given = std::filesystem::absolute(file);
-  const std::filesystem::path absolute =
-      std::filesystem::weakly_canonical(given.parent_path()) / given.filename();
+  const std::filesystem::path given = absolute_name(file);
+  std::error_code error;
+  const std::filesystem::path directory = std::filesystem::weakly_canonical(given.parent_path(), error);
+  const std::filesystem::path absolute = error ? given : directory / given.filename();
   begin(absolute, absolute.parent_path());
 }
 
