@@ -340,6 +340,9 @@ void read_bodies(TomlTable& table, const SceneReading& reading) {
 
 void read_scene(TomlTable& table, const SceneReading& reading) {
   SceneSettings& scene = reading.scene;
+  table.foreign({"description", "scene", "device", "servo", "rendering", "wrench", "limits", "simulation",
+                 "recording", "control", "view", "hand"},
+                "this is a configuration, which names its scene: give the file that its key 'scene' names");
   TomlValue mass = table.optional("mass", "kg");
   table.optional("surface_tolerance_m").number(scene.surface_tolerance_m, kSurfaceTolerance_m);
   table.mandatory("tool").table(read_scene_tool, reading, mass);

@@ -34,6 +34,8 @@ Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchP
   std::optional<SecondHand> other;
   const auto read = [&](TomlTable& root) {
     const SettingContext context{search, file};
+    root.foreign({"mass", "tool", "obstacle", "body", "gravity_m_per_s2", "surface_tolerance_m"},
+                 "this is a scene: give it with --scene, or as 'scene' in a configuration");
     read_settings(root, context, settings);
     other = read_second_hand(root, context, settings);
   };

@@ -193,6 +193,11 @@ TomlValue TomlTable::mandatory_unless(std::string_view other, std::string_view k
   return optional(key);
 }
 
+void TomlTable::foreign(std::initializer_list<std::string_view> keys, std::string_view advice) {
+  foreign_.assign(keys.begin(), keys.end());
+  foreign_advice_ = advice;
+}
+
 void TomlTable::close() {
   for (const TomlEntry& entry : std::get<TomlNode::Table>(node_.value)) reject_unknown(entry);
   for (const MissingKey& key : missing_) {
@@ -206,7 +211,9 @@ void TomlTable::close() {
 void TomlTable::reject_unknown(const TomlEntry& entry) {
   const auto same = [&](const KnownKey& key) { return key.name == entry.key; };
   if (std::any_of(known_.begin(), known_.end(), same)) return;
-  const NearestKey nearest = nearest_key(entry.key, known_);
+  NearestKey nearest = nearest_key(entry.key, known_);
+  if (std::find(foreign_.begin(), foreign_.end(), entry.key) != foreign_.end())
+    nearest = {"", foreign_advice_};
   rejections_.add(entry.location,
                   "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
   std::erase_if(missing_, [&](const MissingKey& key) {

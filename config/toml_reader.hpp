@@ -116,6 +116,9 @@ class TomlTable {
   /// A mandatory key, unless the optional key `other` is present. Both keys count as requested.
   TomlValue mandatory_unless(std::string_view other, std::string_view key);
 
+  /// Keys of another kind of file: unknown here, and rejected with this advice.
+  void foreign(std::initializer_list<std::string_view> keys, std::string_view advice);
+
   /// Rejects unknown keys and missing mandatory keys.
   void close();
 
@@ -129,6 +132,8 @@ class TomlTable {
   std::string name_;
   std::vector<KnownKey> known_;
   std::vector<MissingKey> missing_;
+  std::vector<std::string> foreign_;
+  std::string foreign_advice_;
 };
 
 /// Reads a root table of FILE through read(TomlTable&, args...). Throws one ConfigError with all defects.

@@ -476,4 +476,12 @@ TEST_CASE("mutated files load or are rejected", "[config]") {
   CHECK(rejected > kMutants / 4);
 }
 
+TEST_CASE("a configuration in place of a scene, or the reverse, is named as what it is", "[config]") {
+  using Catch::Matchers::Contains;
+  CHECK_THAT(rejection_text(as_scene, kConfig / "gallery/staircase.toml"),
+             Contains("'view' is not known; this is a configuration") && Contains("its key 'scene'"));
+  CHECK_THAT(rejection_text(as_settings, kConfig / "scenes/staircase.toml"),
+             Contains("'obstacle' is not known; this is a scene") && Contains("--scene"));
+}
+
 }  // namespace wrenchd
