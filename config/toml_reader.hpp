@@ -116,7 +116,8 @@ class TomlTable {
   /// A mandatory key, unless the optional key `other` is present. Both keys count as requested.
   TomlValue mandatory_unless(std::string_view other, std::string_view key);
 
-  /// Keys of another kind of file: unknown here, and rejected with this advice.
+  /// Names the keys of another kind of file. They are unknown here; the advice for one of them says which
+  /// file this is, and where to give it.
   void foreign(std::initializer_list<std::string_view> keys, std::string_view advice);
 
   /// Rejects unknown keys and missing mandatory keys.
@@ -132,7 +133,7 @@ class TomlTable {
   std::string name_;
   std::vector<KnownKey> known_;
   std::vector<MissingKey> missing_;
-  std::vector<std::string> foreign_;
+  std::vector<std::string> foreign_;  ///< keys of another kind of file
   std::string foreign_advice_;
 };
 

@@ -20,7 +20,8 @@
 
 // A round: wait for input; accept new clients; then serve each client, the one with the most tokens first:
 // read, process a few lines, send replies and events. At its end the round checks the lease. A round that
-// takes long ends before it has served all: those that are left have the most tokens in the next one.
+// takes long ends before it has served every client; the others have more tokens left, so the next one serves
+// them first.
 
 namespace wrenchd {
 namespace {
@@ -28,7 +29,8 @@ namespace {
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWake = 1;
 constexpr int kAcceptPerRound = 16;
-/// A client with tokens, as one that requests a stop, waits for one round at most.
+/// A round serves no further client after this time. A client that has tokens, such as one that requests a
+/// stop, is among the first of the next round, so this is about how long it waits.
 constexpr Duration kLongestRound = std::chrono::milliseconds(2);
 /// Pause before the next accept() if the process has no free descriptors.
 constexpr Duration kAcceptPause = std::chrono::milliseconds(100);
@@ -137,11 +139,12 @@ void ControlSocket::run(const std::stop_token& stop) {
     for (auto& [number, client] : clients_) turns.push_back(&client);
     std::stable_sort(turns.begin(), turns.end(),
                      [](const Client* a, const Client* b) { return a->tokens > b->tokens; });
-    round_is_cut_ = false;
-    for (Client* client : turns) {
-      if (round_is_cut_ = client != turns.front() && wall_now() - now > kLongestRound; round_is_cut_) break;
+    std::size_t served = 0;
+    while (served < turns.size() && (served == 0 || wall_now() - now < kLongestRound)) {
+      Client* client = turns[served++];
       if (!guard.run([&] { serve(*client, now); })) client->to_remove = true;
     }
+    round_is_cut_ = served < turns.size();
     guard.run([&] { lease_.check(wall_now()); });
     guard.run([&] { remove_clients(); });
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <iterator>
 #include <random>
+#include <regex>
 #include <utility>
 
 #include <catch2/catch.hpp>
@@ -482,6 +483,14 @@ TEST_CASE("a configuration in place of a scene, or the reverse, is named as what
              Contains("'view' is not known; this is a configuration") && Contains("its key 'scene'"));
   CHECK_THAT(rejection_text(as_settings, kConfig / "scenes/staircase.toml"),
              Contains("'obstacle' is not known; this is a scene") && Contains("--scene"));
+  const TemporaryDirectory dir;
+  const std::string manual = text_of(kConfig / "wrenchd.toml");
+  const std::regex section("\n\\[(\\w+)\\]\n");
+  int sections = 0;
+  for (std::sregex_iterator i(manual.begin(), manual.end(), section), end; i != end; ++i, ++sections)
+    CHECK_THAT(rejection_text(as_scene, dir.write("section.toml", "[" + (*i)[1].str() + "]\n")),
+               Contains("this is a configuration"));
+  CHECK(sections >= 9);
 }
 
 }  // namespace wrenchd

@@ -42,7 +42,7 @@ class Signalled {
   } catch (const ClientError&) {  // the daemon did not open its socket in time
     return false;
   }
-  /// Waits for its end until then.
+  /// Waits until this time at most. Returns true if the daemon has ended.
   bool ends_before(std::chrono::steady_clock::time_point end) {
     return daemon_.ends_within(std::chrono::ceil<std::chrono::milliseconds>(
         std::max<std::chrono::nanoseconds>(end - std::chrono::steady_clock::now(), 2ms)));

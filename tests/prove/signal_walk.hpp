@@ -17,7 +17,8 @@ struct SignalWalk {
 };
 
 /// Sends every signal that can be handled to an armed daemon, a few daemons at a time. program: path of
-/// wrenchd. directory: for its files. Throws std::system_error.
+/// wrenchd. config: its configuration, with which an armed loop is soon active. directory: for its files.
+/// Throws std::system_error.
 SignalWalk walk_signals(const std::string& program, const std::filesystem::path& config,
                         const std::filesystem::path& directory);
 

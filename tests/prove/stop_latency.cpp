@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <limits>
 #include <string>
 #include <thread>
 
@@ -43,7 +43,7 @@ void keep_armed(Client& client) try {
 } catch (const ClientError&) {
   try {
     client.acquire_lease();
-  } catch (const ClientError&) {
+  } catch (const ClientError&) {  // the next call tries again
   }
 }
 
@@ -58,7 +58,7 @@ std::vector<StopRequest> request_stops(const fs::path& socket, Abusers& abusers,
                    [&](const OtherUser::Report& report) { stop_often(socket, per_kind, report); });
     for (bool ended = false; !ended;) {
       keep_armed(client);
-      ended = user.has_ended();  // asked for first: its last numbers are still read
+      ended = user.has_ended();  // before its numbers are read, so that none is missed
       while (const auto sent_ns = user.next(10ms)) requests.push_back({kind, *sent_ns});
     }
     abusers.end();
@@ -76,8 +76,8 @@ StopLatency stop_latency(const std::vector<StopRequest>& requests, std::size_t k
     const auto tick = std::find_if(ticks.begin(), ticks.end(), [&](const TickRecord& one) {
       return one.now_ns >= request.sent_ns && one.state == static_cast<std::uint8_t>(State::stopped);
     });
-    const double took_ms =
-        tick == ticks.end() ? HUGE_VAL : 1e-6 * static_cast<double>(tick->now_ns - request.sent_ns);
+    const double took_ms = tick == ticks.end() ? std::numeric_limits<double>::infinity()
+                                               : 1e-6 * static_cast<double>(tick->now_ns - request.sent_ns);
     if (took_ms > std::chrono::duration<double, std::milli>(kMostWait).count())
       ++result.missed;
     else
