@@ -48,7 +48,7 @@ SolidProperties properties(const TriangleMesh& mesh, const ConvexBody& hull, con
 }  // namespace
 
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
-  ConvexBody hull = convex_hull(mesh.vertices_m);
+  ConvexBody hull = convex_hull(mesh);
   return tool_body(std::move(mesh), std::move(hull), scale, mass_kg);
 }
 

@@ -3,12 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <optional>
 #include <vector>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/convex_hull_3.h>
+
+#include "core/least_distance.hpp"
 
 namespace wrenchd {
 
@@ -36,7 +40,79 @@ std::optional<Vector3d> plane_normal(std::span<const Vector3d> points, double& s
   return normal;
 }
 
+/// The neighbours of each vertex of a mesh. At the border of a surface some may be missing.
+class Neighbours {
+ public:
+  explicit Neighbours(const TriangleMesh& mesh)
+      : begin_(mesh.vertices_m.size() + 1, 0), vertices_(3 * mesh.triangles.size()) {
+    for (const auto& corners : mesh.triangles)
+      for (const std::uint32_t v : corners) ++begin_[v + 1];
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    std::vector<std::uint32_t> at(begin_.begin(), begin_.end() - 1);
+    for (const auto& [a, b, c] : mesh.triangles)
+      vertices_[at[a]++] = b, vertices_[at[b]++] = c, vertices_[at[c]++] = a;
+  }
+  std::span<const std::uint32_t> of(std::size_t vertex) const {
+    return std::span(vertices_).subspan(begin_[vertex], begin_[vertex + 1] - begin_[vertex]);
+  }
+
+ private:
+  std::vector<std::uint32_t> begin_, vertices_;
+};
+
+/// Finds the vertices that a plane separates from their neighbours. A vertex of the hull is one of them.
+class LocalExtremes {
+ public:
+  explicit LocalExtremes(const TriangleMesh& mesh) : mesh_(mesh), neighbours_(mesh) {}
+
+  std::vector<Vector3d> find() {
+    std::vector<Vector3d> found;
+    for (std::size_t v = 0; v < mesh_.vertices_m.size(); ++v)
+      if (is_extreme(v)) found.push_back(mesh_.vertices_m[v]);
+    return found;
+  }
+
+ private:
+  /// Looks for z with n . z >= kSlope for the unit vectors n from the neighbours to the vertex. The shorter
+  /// the least z is, the sharper is the corner.
+  bool is_extreme(std::size_t v) {
+    const auto around = neighbours_.of(v);
+    if (around.empty() || around.size() > kMaxNeighbours) return true;
+    problem_.clear();
+    for (const std::uint32_t neighbour : around) {
+      const Vector3d edge = mesh_.vertices_m[v] - mesh_.vertices_m[neighbour];
+      const double length = edge.norm();
+      if (!(length > 0.0)) return true;
+      problem_.add_unit(edge / length, kSlope);
+    }
+    switch (problem_.solve(Vector3d::Zero(), kSlope * kRounding)) {
+      case decltype(problem_)::Status::optimal:
+        return problem_.z().norm() * kRounding < kSlope;
+      case decltype(problem_)::Status::infeasible:
+        return false;
+      case decltype(problem_)::Status::budget_spent:
+        break;
+    }
+    return true;
+  }
+
+  static constexpr std::size_t kMaxNeighbours = 64;
+  /// A vertex that is higher above all its neighbours than this fraction of its edges is no result of
+  /// rounding.
+  static constexpr double kRounding = 1e-12;
+  static constexpr double kSlope = 1e-6;
+
+  const TriangleMesh& mesh_;
+  Neighbours neighbours_;
+  LeastDistance<3, kMaxNeighbours> problem_;
+};
+
 }  // namespace
+
+ConvexBody convex_hull(const TriangleMesh& mesh) {
+  const std::vector<Vector3d> extremes = LocalExtremes(mesh).find();
+  return convex_hull(extremes.size() >= 4 ? std::span(extremes) : std::span(mesh.vertices_m));
+}
 
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
   double size = 0.0;

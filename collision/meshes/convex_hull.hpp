@@ -14,6 +14,11 @@ namespace wrenchd {
 /// seconds.
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m);
 
+/// Returns the convex hull of a mesh: that of its vertices. Vertices that lie in the convex hull of their
+/// neighbours, up to rounding, are left out first. Fine flat and curved walls, where most points are of this
+/// kind and exact arithmetic decides, take a small part of the time of the points alone. Not RT-safe.
+ConvexBody convex_hull(const TriangleMesh& mesh);
+
 /// Returns the volume of a convex body [cube of the vertices' unit]. RT-safe.
 double volume(const ConvexBody& body);
 

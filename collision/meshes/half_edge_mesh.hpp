@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -46,15 +47,19 @@ class HalfEdgeMesh {
   std::size_t face_count() const { return triangles_.size(); }
   std::size_t vertex_count() const { return vertices_m_.size(); }
 
-  /// Calls use(half-edge) for each half-edge that leaves a vertex, in order around the vertex.
+  /// Calls use(half-edge) for each half-edge that leaves the start of `first`, which comes first,
+  /// anticlockwise as seen from outside.
   template <class Use>
-  void for_each_outgoing(std::uint32_t vertex, const Use& use) const {
-    const std::uint32_t first = outgoing_[vertex];
+  void for_each_outgoing_from(std::uint32_t first, const Use& use) const {
     std::uint32_t h = first;
     do {
       use(h);
       h = twin_[previous(h)];
     } while (h != first);
+  }
+  template <class Use>
+  void for_each_outgoing(std::uint32_t vertex, const Use& use) const {
+    for_each_outgoing_from(outgoing_[vertex], use);
   }
 
   /// Merges the end of the half-edge into its start and moves the start to p_m. Precondition: the collapse
@@ -79,21 +84,28 @@ class HalfEdgeMesh {
  private:
   /// Returns false unless every edge has exactly one half-edge in each direction.
   bool pair_half_edges() {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
-    keys.reserve(half_edge_count());
-    for (std::uint32_t h = 0; h < half_edge_count(); ++h) {
-      const std::uint64_t a = from(h), b = to(h);
-      keys.emplace_back(std::min(a, b) << 32 | std::max(a, b), h);
-    }
-    std::sort(keys.begin(), keys.end());
+    // The half-edges of both directions in order of their smaller end; the few at one vertex are searched.
+    std::vector<std::uint32_t> begin(vertices_m_.size() + 1, 0), at_vertex(half_edge_count());
+    const auto smaller_end = [&](std::uint32_t h) { return std::min(from(h), to(h)); };
+    for (std::uint32_t h = 0; h < half_edge_count(); ++h) ++begin[smaller_end(h) + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<std::uint32_t> end(begin.begin(), begin.end() - 1);
+    for (std::uint32_t h = 0; h < half_edge_count(); ++h) at_vertex[end[smaller_end(h)]++] = h;
     twin_.assign(half_edge_count(), kNone);
-    if (keys.size() % 2 != 0) return false;
-    for (std::size_t i = 0; i < keys.size(); i += 2) {
-      const std::uint32_t g = keys[i].second, h = keys[i + 1].second;
-      if (keys[i].first != keys[i + 1].first || from(g) == from(h)) return false;
-      if (i + 2 < keys.size() && keys[i + 2].first == keys[i].first) return false;
-      twin_[g] = h;
-      twin_[h] = g;
+    for (std::uint32_t v = 0; v < vertices_m_.size(); ++v) {
+      const auto first = at_vertex.begin() + begin[v], last = at_vertex.begin() + begin[v + 1];
+      const auto larger_end = [&](std::uint32_t h) { return std::max(from(h), to(h)); };
+      std::sort(first, last, [&](std::uint32_t g, std::uint32_t h) {
+        return std::pair(larger_end(g), g) < std::pair(larger_end(h), h);
+      });
+      if ((last - first) % 2 != 0) return false;
+      for (auto at = first; at != last; at += 2) {
+        const std::uint32_t g = at[0], h = at[1];
+        if (larger_end(g) != larger_end(h) || from(g) == from(h)) return false;
+        if (last - at > 2 && larger_end(at[2]) == larger_end(g)) return false;
+        twin_[g] = h;
+        twin_[h] = g;
+      }
     }
     return true;
   }

@@ -151,33 +151,35 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
 /// in a point.
 void check_vertices(const PolygonSoup& soup, MeshReport& report) {
   struct FaceCorner {
-    std::size_t vertex, from, to;  ///< a face arrives at `vertex` from `from` and leaves towards `to`
+    std::size_t from, to;  ///< a face arrives from `from` and leaves towards `to`
   };
-  std::vector<FaceCorner> corners;
+  std::vector<std::size_t> begin_of(soup.vertices.size() + 1, 0);
+  for (const auto& face : soup.faces)
+    for (const std::size_t v : face) ++begin_of[v + 1];
+  std::partial_sum(begin_of.begin(), begin_of.end(), begin_of.begin());
+  std::vector<FaceCorner> corners(begin_of.back());
+  std::vector<std::size_t> at_vertex(begin_of.begin(), begin_of.end() - 1);
   for (const auto& face : soup.faces)
     for (std::size_t i = 0; i < face.size(); ++i)
-      corners.push_back(
-          {face[i], face[i > 0 ? i - 1 : face.size() - 1], face[i + 1 < face.size() ? i + 1 : 0]});
-  const auto before = [](const FaceCorner& a, const FaceCorner& b) {
-    return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
-  };
-  std::sort(corners.begin(), corners.end(), before);
+      corners[at_vertex[face[i]]++] = {face[i > 0 ? i - 1 : face.size() - 1],
+                                       face[i + 1 < face.size() ? i + 1 : 0]};
+  const auto before = [](const FaceCorner& a, const FaceCorner& b) { return a.from < b.from; };
   DefectCount pinched;
-  for (auto begin = corners.begin(); begin != corners.end();) {
-    const auto end =
-        std::find_if(begin, corners.end(), [&](const FaceCorner& c) { return c.vertex != begin->vertex; });
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
+    const auto begin = corners.begin() + static_cast<std::ptrdiff_t>(begin_of[v]),
+               end = corners.begin() + static_cast<std::ptrdiff_t>(begin_of[v + 1]);
+    if (begin == end) continue;
+    std::sort(begin, end, before);
     std::ptrdiff_t ring = 0;
     auto at = begin;
     do {
-      at = std::lower_bound(begin, end, FaceCorner{begin->vertex, at->to, 0}, before);
+      at = std::lower_bound(begin, end, FaceCorner{at->to, 0}, before);
     } while (++ring < end - begin && at != begin);
     if (ring < end - begin)
       pinched.add([&] {
-        return "parts of the surface are joined only in vertex " +
-               std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
-               format_point(soup.vertices[begin->vertex]);
+        return "parts of the surface are joined only in vertex " + std::to_string(soup.vertex_in_file(v)) +
+               " at " + format_point(soup.vertices[v]);
       });
-    begin = end;
   }
   pinched.report(report.defects, "separate them in the modeller");
 }

@@ -324,10 +324,10 @@ LoadedMesh MeshLoader::check_added(const PolygonSoup& soup, const std::filesyste
 
 ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {
   const std::size_t triangles = loaded.mesh.triangles.size();
-  return cached<ConvexBody>({"hull", bytes_of(loaded.mesh.vertices_m)}, triangles >= kLargeMeshTriangles,
-                            [&] {
+  return cached<ConvexBody>({"hull", bytes_of(loaded.mesh.vertices_m), bytes_of(loaded.mesh.triangles)},
+                            triangles >= kLargeMeshTriangles, [&] {
                               report_progress(loaded.file, triangles, "finding its convex hull");
-                              return convex_hull(loaded.mesh.vertices_m);
+                              return convex_hull(loaded.mesh);
                             });
 }
 

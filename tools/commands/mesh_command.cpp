@@ -64,7 +64,7 @@ void print_surface(PolygonSoup soup, const std::filesystem::path& file, double s
   settings.scale = scale;
   settings.kind = BodyKind::surface;
   settings.inertia_source = InertiaSource::hull;
-  ConvexBody hull = convex_hull(mesh.vertices_m);
+  ConvexBody hull = convex_hull(mesh);
   const ToolBody tool = tool_body(std::move(mesh), std::move(hull), settings);
   require_usable(tool.solid, file, scale);
   const Matrix3d& H = tool.solid.inertia.H_kg_m2;
