@@ -128,9 +128,11 @@ TEST_CASE("a log and a live line that nobody reads block neither clients nor the
       }
     }
   }
+#ifndef __SANITIZE_THREAD__  // its _exit() flushes standard error, for which it waits
   daemon.signal(SIGTERM);
   const int code = daemon.wait();
   CHECK((code == 0 || code == 3));  // 3: the run ended stopped
+#endif
 }
 
 TEST_CASE("a reader of the live line that leaves does not end wrenchd", "[streams]") {
