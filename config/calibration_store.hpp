@@ -7,12 +7,10 @@
 #include <string_view>
 
 #include "config/config_error.hpp"
+#include "config/device_file.hpp"
 #include "core/calibration.hpp"
 
 namespace wrenchd {
-
-/// Directory of wrenchd's persistent data: $STATE_DIRECTORY, which systemd sets; otherwise /var/lib/wrenchd.
-std::filesystem::path state_directory();
 
 /// Calibrations on disk: one small readable TOML file per device.
 ///
@@ -42,9 +40,7 @@ class CalibrationStore {
   /// crash the old or the new file is present, and possibly a hidden .part file.
   void write(const Calibration& calibration) const;
 
-  /// "PROFILE@SERIAL.toml" in the directory. Bytes other than letters, digits, _, - and inner dots are
-  /// written as % and two hexadecimal digits, so each device has its own file inside of the directory. Throws
-  /// std::invalid_argument if a part is empty or the name is too long.
+  /// See device_file().
   std::filesystem::path file_of(std::string_view profile, std::string_view serial) const;
 
  private:

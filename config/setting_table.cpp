@@ -190,6 +190,7 @@ constexpr std::array kTable = {
     WRENCHD_SETTING("device", "profile", "", restart, device.profile, read_profile(value, context, settings.device)),
     WRENCHD_SETTING("device", "serial", "", restart, device.serial, value.text(out)),
     WRENCHD_SETTING("device", "usb_port", "", restart, device.usb_port, value.text(out)),
+    WRENCHD_SETTING("device", "first_test", "", restart, device.first_test, value.boolean(out)),
     WRENCHD_SETTING("device", "base_in_world", "", restart, device.base_in_world, read_pose(value, out)),
     WRENCHD_SETTING("device", "tool_in_handle", "", new_rendering, device.tool_in_handle, read_pose(value, out)),
     WRENCHD_NUMBER("servo", "rate_Hz", restart, servo.rate_Hz, 500, 8000),

@@ -73,8 +73,9 @@ inline constexpr const char* kAnyProfile = "auto";
 struct DeviceSettings {
   std::string profile = "loopback";    ///< name of a profile file without .toml, or a file name with .toml
   std::filesystem::path profile_file;  ///< resolved profile file; empty for kAnyProfile
-  std::string serial;    ///< serial number of the device, if several equal ones are connected; empty: any
-  std::string usb_port;  ///< bus and ports of the device, "3-1.2", if it has no serial number; empty: any
+  std::string serial;      ///< serial number of the device, if several equal ones are connected; empty: any
+  std::string usb_port;    ///< bus and ports of the device, "3-1.2", if it has no serial number; empty: any
+  bool first_test = true;  ///< tests a device before it is armed for the first time
   PoseSettings base_in_world;   ///< X_WB: pose of the device base in the world
   PoseSettings tool_in_handle;  ///< X_HM: mesh frame of the tool in the handle frame
 };

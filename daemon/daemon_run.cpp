@@ -24,6 +24,7 @@
 #include "daemon/control/wrench_methods.hpp"
 #include "daemon/device_run.hpp"
 #include "daemon/device_start.hpp"
+#include "daemon/first_test.hpp"
 #include "daemon/hand_file.hpp"
 #include "daemon/hand_scenes.hpp"
 #include "daemon/log_prefix.hpp"
@@ -124,8 +125,8 @@ LiveView::Print live_print(const Options& options, OutputQueue& queue) {
 struct HandDevice {
   LoopbackScript script = {};  ///< faults and commands for a simulated device
   std::unique_ptr<ReportLink> link = {};
-  DeviceInHand* simulated = nullptr;          ///< null: a real device, or one in another process
-  const ReconnectingLink* plugged = nullptr;  ///< null: a simulated device
+  DeviceInHand* simulated = nullptr;    ///< null: a real device, or one in another process
+  ReconnectingLink* plugged = nullptr;  ///< null: a simulated device
 };
 
 /// Returns the simulated device with the faults of the script.
@@ -270,6 +271,23 @@ void open_simulated(Hand& hand) {
   log_missing_motors(hand.runtime.config().profile);
 }
 
+/// Tests a device in another process before it is armed. It has no serial number, so the test is not
+/// remembered.
+void test_first(Hand& hand, Clock& clock, TimePoint end) {
+  const RunConfig& config = hand.runtime.config();
+  const TestedDevices tested;
+  if (hand.device.simulated != nullptr || !needs_first_test(config, nullptr, tested)) return;
+  hand.runtime.set_arming_obstacle("it is being tested; wait some seconds");
+  const StopCondition stop = [&] { return hand.context.stop_requested() || clock.now() >= end; };
+  const ReportWaiting waiting = [&](const std::string& reason) {
+    hand.context.service.waiting(reason, hand.context.hand);
+  };
+  const std::string obstacle =
+      run_first_test(config, *hand.device.link, nullptr, clock, stop, waiting, tested);
+  if (!obstacle.empty()) spdlog::warn("the device cannot be armed: {}", obstacle);
+  hand.runtime.set_arming_obstacle(obstacle);
+}
+
 /// Runs the loop with a simulated device. If a script unplugs the device, waits until it can be opened again,
 /// as for a real device; it is disarmed then. `run_once` runs the loop until it ends.
 Fault run_with_reconnection(Hand& hand, Clock& clock, TimePoint end, ScheduledRequests& requests,
@@ -335,9 +353,11 @@ Fault run_one_in_wall_time(Hand& hand, WallClock& clock, TimePoint end) {
   return run_hand(hand, clock, [&](Recordings&, LiveView& view) {
     if (hand.device.plugged != nullptr)
       return run_with_device(hand.runtime, context, *hand.device.plugged, end, clock, view);
+    test_first(hand, clock, end);
     open_simulated(hand);
     const TimePoint simulated_end = end_time(context.options, clock);
-    ScheduledRequests requests(context.options.arm, hand.device.script.commands, clock.now());
+    const bool arm = context.options.arm && hand.runtime.arming_obstacle().empty();
+    ScheduledRequests requests(arm, hand.device.script.commands, clock.now());
     const auto run_once = [&] {
       return run_in_wall_time(hand.runtime, context, hand.runtime.config().profile.name + ", simulated",
                               simulated_end, clock, view, requests);

@@ -1,15 +1,40 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/device_run.hpp"
 
+#include <optional>
+#include <stdexcept>
+
 #include <spdlog/spdlog.h>
 
 #include "daemon/device_start.hpp"
+#include "daemon/first_test.hpp"
 #include "daemon/wall_time_run.hpp"
 
 namespace wrenchd {
+namespace {
 
-Fault run_with_device(Runtime& runtime, const RunContext& context, const ReconnectingLink& link,
-                      TimePoint end, WallClock& clock, LiveView& view) {
+/// Returns why the opened device must not be armed, with the remedy; "" if it may. A device that was never
+/// armed is tested, and opened again; nothing: it cannot be opened again.
+std::optional<std::string> find_obstacle(Runtime& runtime, ReconnectingLink& link, WallClock& clock,
+                                         const StopCondition& stop, const ReportWaiting& waiting) {
+  const UsbDevice device = link.device().value();
+  const std::string not_calibrated = apply_calibration(runtime, device, CalibrationStore());
+  const TestedDevices tested;
+  if (!not_calibrated.empty() || !needs_first_test(runtime.config(), &device, tested)) return not_calibrated;
+  runtime.close();
+  const std::string obstacle = run_first_test(runtime.config(), link, &device, clock, stop, waiting, tested);
+  try {
+    runtime.open();
+  } catch (const std::runtime_error&) {
+    return {};
+  }
+  return obstacle;
+}
+
+}  // namespace
+
+Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingLink& link, TimePoint end,
+                      WallClock& clock, LiveView& view) {
   const StopCondition stop = [&] { return context.stop_requested() || clock.now() >= end; };
   const ReportWaiting waiting = [&](const std::string& reason) {
     context.service.waiting(reason, context.hand);
@@ -18,18 +43,22 @@ Fault run_with_device(Runtime& runtime, const RunContext& context, const Reconne
   DeviceWait wait;
   for (bool at_start = true;; at_start = false) {
     if (!open_device(runtime, wait, at_start, stop, waiting)) return Fault::none;
-    const UsbDevice& device = link.device().value();
+    const UsbDevice device = link.device().value();
     if (at_start) log_device(profile, device);
     if (at_start) log_missing_motors(profile);
     if (!at_start) spdlog::info("the device is connected again, and is disarmed: {}", describe(device));
-    const std::string not_armed = apply_calibration(runtime, device, CalibrationStore());
-    if (!not_armed.empty()) spdlog::warn("the device cannot be armed: {}", not_armed);
+    runtime.set_arming_obstacle("it is being tested; wait some seconds");
+    const std::optional<std::string> obstacle = find_obstacle(runtime, link, clock, stop, waiting);
+    if (!obstacle && stop()) return Fault::none;
+    if (!obstacle) continue;
+    if (!obstacle->empty()) spdlog::warn("the device cannot be armed: {}", *obstacle);
+    runtime.set_arming_obstacle(*obstacle);
     if (!wait_for_rest_pose(runtime, clock, stop, waiting)) {
       runtime.close();
       if (stop()) return Fault::none;
       continue;
     }
-    ScheduledRequests requests(context.options.arm && at_start && not_armed.empty(), {}, clock.now());
+    ScheduledRequests requests(context.options.arm && at_start && obstacle->empty(), {}, clock.now());
     const Fault fault = run_in_wall_time(runtime, context, profile.name + ", " + describe(device), end, clock,
                                          view, requests);
     if (fault == Fault::device_lost) waiting("the device was unplugged");

@@ -12,7 +12,7 @@ namespace wrenchd {
 /// Runs the servo loop with a real device. Waits for the device, and waits again after each unplugging; a
 /// device that returns is disarmed. Returns the fault that ended the run, else Fault::none. Throws if the
 /// device cannot be used at the start. Not RT-safe: returns when the run is over.
-Fault run_with_device(Runtime& runtime, const RunContext& context, const ReconnectingLink& link,
-                      TimePoint end, WallClock& clock, LiveView& view);
+Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingLink& link, TimePoint end,
+                      WallClock& clock, LiveView& view);
 
 }  // namespace wrenchd

@@ -155,6 +155,17 @@ Runtime::~Runtime() {
   device_.close();
 }
 
+void Runtime::set_arming_obstacle(std::string reason) {
+  loop_.requests().permit_arming(reason.empty());
+  const std::lock_guard lock(obstacle_mutex_);
+  arming_obstacle_ = std::move(reason);
+}
+
+std::string Runtime::arming_obstacle() const {
+  const std::lock_guard lock(obstacle_mutex_);
+  return arming_obstacle_;
+}
+
 SharedState& Runtime::enable_shared_state() {
   if (shared_state_) return *shared_state_;
   shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(config_));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -74,6 +75,11 @@ class Runtime {
   /// The device, for homing. Precondition: no servo thread runs.
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
+  /// Forbids arming, whoever asks for it, for this reason, which ends with a remedy; "" permits it. Any
+  /// thread.
+  void set_arming_obstacle(std::string reason);
+  /// Returns why the device must not be armed; "" if it may. Any thread.
+  std::string arming_obstacle() const;
   /// Changes scene, rendering and limits while the loop runs.
   Reconfigurator& reconfigurator() noexcept { return reconfigurator_; }
   /// Creates the shared memory that publishes every tick to recorders and other processes. The first call
@@ -92,6 +98,8 @@ class Runtime {
   RecordingHeader recorded_texts_;  ///< texts of the files at the start, except the scene's
   ProfileDevice device_;
   std::unique_ptr<SharedState> shared_state_;
+  mutable std::mutex obstacle_mutex_;
+  std::string arming_obstacle_;  ///< protected by obstacle_mutex_
   ServoLoop loop_;
   Reconfigurator reconfigurator_;
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "tools/conformance.hpp"
+#include "devices/conformance/conformance.hpp"
 
 namespace wrenchd {
 

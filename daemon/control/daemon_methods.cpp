@@ -59,7 +59,10 @@ Json before_cause_json(const FeedSnapshot& now) {
 /// Why there is no force now, as text; null in states with force.
 Json no_force_json(const DaemonContext& context, const FeedSnapshot& now) {
   const WaitReason reason = context.runtime.loop().telemetry().wait_reason();
-  const std::string text = no_force_text(now.state, now.cause, reason, context.runtime.config().profile);
+  std::string text = no_force_text(now.state, now.cause, reason, context.runtime.config().profile);
+  if (const std::string obstacle = context.runtime.arming_obstacle();
+      now.state == State::disarmed && !obstacle.empty())
+    text = "the device cannot be armed: " + obstacle;
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
@@ -146,6 +149,9 @@ void check_state(const ServoLoop& loop, Trigger trigger, const char* action) {
 MethodResult arm(const DaemonContext& context, const Caller& caller) {
   check_holder(context.lease, caller);
   check_state(context.runtime.loop(), Trigger::arm, "armed");
+  if (const std::string obstacle = context.runtime.arming_obstacle(); !obstacle.empty())
+    throw RpcError(RpcCode::invalid_state, "The device cannot be armed: " + obstacle + ".",
+                   {{"state", name(context.runtime.loop().telemetry().state())}});
   context.lease.arm(std::chrono::steady_clock::now());
   return Json{{"requested", "arm"}};
 }

@@ -14,8 +14,9 @@ std::optional<T> newest(LatestValue<T>& value) noexcept {
 }  // namespace
 
 Requests RequestInbox::take() noexcept {
-  return {commands_.exchange(held_.load(std::memory_order_relaxed), std::memory_order_relaxed),
-          newest(workspace_), newest(local_models_), newest(limits_), newest(external_wrench_)};
+  CommandSet commands = commands_.exchange(held_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+  if (!arming_permitted_.load(std::memory_order_relaxed)) commands &= ~CommandSet{kArm};
+  return {commands, newest(workspace_), newest(local_models_), newest(limits_), newest(external_wrench_)};
 }
 
 }  // namespace wrenchd

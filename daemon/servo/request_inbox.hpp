@@ -37,6 +37,10 @@ class RequestInbox {
     held_.fetch_or(commands, std::memory_order_relaxed);
     request(commands);
   }
+  /// While arming is forbidden, take() drops requests to arm. For a device that no force may drive yet.
+  void permit_arming(bool permitted) noexcept {
+    arming_permitted_.store(permitted, std::memory_order_relaxed);
+  }
   /// Arms on behalf of the process itself: no heartbeat is needed.
   void arm() noexcept { request(kArm); }
   /// Arms on behalf of a client that calls heartbeat() at least every 100 ms from now on.
@@ -78,6 +82,7 @@ class RequestInbox {
 
  private:
   std::atomic<CommandSet> commands_{kNoCommand};
+  std::atomic<bool> arming_permitted_{true};
   std::atomic<CommandSet> held_{kNoCommand};  ///< requested for every tick
   LatestValue<WorkspaceRequest> workspace_;
   LatestValue<LocalModelSet> local_models_;

@@ -135,7 +135,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 65);
+  CHECK(options == 66);
 }
 
 TEST_CASE("every shipped file is valid", "[config]") {

@@ -239,7 +239,7 @@ class Proof {
       throw std::runtime_error("profile " + profile_.name +
                                " has no watchdog, and nothing to prove; take another");
     // All settings except the soft start are as shipped. A long soft start would only slow down the proof.
-    config_ = files_.write("wrenchd.toml", "[limits]\nsoft_start_s = 0.25\n");
+    config_ = files_.write("wrenchd.toml", "[device]\nfirst_test = false\n[limits]\nsoft_start_s = 0.25\n");
     bound_ = from_seconds(profile_.watchdog_s + 1.0 / profile_.report_rate_Hz);
   }
 

@@ -161,8 +161,9 @@ TEST_CASE("a device that requires calibration is not armed before it", "[usb]") 
   if (calibrated) store.write({"patient", "A1", {}});
   setenv("STATE_DIRECTORY", files.path().c_str(), 1);
   const LiveHandle handle(machine, {});
-  RunningProgram wrenchd("wrenchd",
-                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
+  const std::string socket = (files.path() / "control.sock").string();
+  RunningProgram wrenchd("wrenchd", {"--config", config, "--profile", profile, "--realtime", "best_effort",
+                                     "--arm", "--control", socket});
   unsetenv("STATE_DIRECTORY");
   if (calibrated) {
     REQUIRE_RATE(load, soon([&] { return handle.was_pushed(); }, kLimit));
@@ -170,6 +171,9 @@ TEST_CASE("a device that requires calibration is not armed before it", "[usb]") 
     REQUIRE_RATE(load, wrenchd.wait_for_output(
                            "cannot be armed: it is not calibrated; run wrenchctl calibrate patient"));
     REQUIRE_RATE(load, soon([&] { return handle.commands() > 300; }, kLimit));
+    const ProgramResult armed = run_program("wrenchctl", {"arm", "--socket", socket});
+    CHECK(armed.exit_code == 1);
+    CHECK_THAT(armed.err, Contains("it is not calibrated; run wrenchctl calibrate patient"));
     CHECK_FALSE(handle.was_pushed());
   }
   wrenchd.signal(SIGTERM);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tools/reported_velocity.hpp"
+#include "devices/conformance/reported_velocity.hpp"
 
 #include <cmath>
 #include <cstddef>

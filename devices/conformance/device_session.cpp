@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tools/device_session.hpp"
+#include "devices/conformance/device_session.hpp"
 
 #include <algorithm>
 #include <array>

@@ -28,10 +28,13 @@ struct RuleResult {
 };
 
 struct ConformanceOptions {
-  /// Longest time in which the user moves the handle.
+  /// Longest time in which the user moves the handle; 0: the user is not asked, and only the motion by pulses
+  /// judges the velocity.
   Duration motion_time = std::chrono::seconds(20);
   /// If false, no command contains a wrench other than zero.
   bool pulses = true;
+  /// If true, the check takes about three seconds instead of ten: shorter series, fewer and shorter pulses.
+  bool brief = false;
 };
 
 /// Callbacks to the user beside the device.
@@ -56,6 +59,10 @@ inline constexpr double kMaxPulse_Nm = 0.02;
 std::vector<RuleResult> check_conformance(const DeviceProfile& profile, ReportLink& link,
                                           const UsbDevice* device, Clock& clock, const ConformanceUser& user,
                                           const ConformanceOptions& options = {});
+
+/// Returns true if the reports of the profile are those of the open report layout, with or without the
+/// velocities.
+bool has_open_layout(const DeviceProfile& profile);
 
 /// Throws std::runtime_error with the difference if the reports of the profile are not those of the open
 /// report layout. The profile may leave out the velocities.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tools/conformance.hpp"
+#include "devices/conformance/conformance.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,19 +11,35 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "core/finite.hpp"
+#include "devices/conformance/device_session.hpp"
+#include "devices/conformance/reported_velocity.hpp"
 #include "devices/discovery/shared_usb_ids.hpp"
 #include "devices/layout_check.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/profile_reports.hpp"
 #include "devices/report_descriptor.hpp"
 #include "devices/simulation/reference_profile.hpp"
-#include "tools/device_session.hpp"
-#include "tools/reported_velocity.hpp"
 
 namespace wrenchd {
 namespace {
 
 using namespace std::chrono_literals;
+
+/// Least and largest number of pulses along an axis.
+constexpr int kMinPulses = 3, kMaxPulses = 6;
+/// Durations of the parts of a check.
+struct Pace {
+  /// Time in which the device is only observed: the jitter of the host changes a rate over it by less than 1
+  /// %, over the brief one by a few per cent.
+  Duration listen;
+  Duration series;      ///< the first commands
+  Duration silence;     ///< after the last command, well above the longest hold time
+  int pulses;           ///< along each axis, more if their effect is not clear
+  Duration pulse;       ///< each half of a pulse
+  Duration after_axis;  ///< in which the handle comes to rest
+};
+constexpr Pace kThorough = {1s, 300ms, 80ms, kMaxPulses, 40ms, 100ms};
+constexpr Pace kBrief = {300ms, 120ms, 45ms, kMinPulses, 30ms, 30ms};
 
 // Sections of devices/README.md.
 constexpr const char* kPoseSection = "Pose report, device to host";
@@ -33,8 +49,6 @@ std::string rule_section(int rule) {
   return fmt::format("Rules for firmware, rule {}", rule);
 }
 
-/// Time in which the device is only observed: the jitter of the host changes a rate over it by less than 1 %.
-constexpr Duration kListen = 1s;
 /// Reports of the first moments may still follow the commands of an earlier host.
 constexpr Duration kEarlierHost = 100ms;
 
@@ -46,8 +60,15 @@ constexpr double kMaxRateError = 0.1;
 /// not.
 constexpr double kMaxClockError = 0.05;
 
-/// Motion of an axis that is enough to judge its velocity.
-constexpr double kTravel_m = 0.010, kTravel_rad = 0.10;
+/// Path length along and about an axis that is enough to judge its velocity.
+struct Travel {
+  double m, rad;
+  double of(std::size_t axis) const { return axis < 3 ? m : rad; }
+};
+constexpr Travel kTravelByHand = {0.010, 0.10};
+/// Pulses move the handle much less. Steps of its encoders must not decide: see travel_by_pulses().
+constexpr Travel kTravelByPulses = {0.0005, 0.005};
+constexpr double kTravelPerStep = 20.0;
 constexpr double kMinTurn_rad = 0.2;
 /// Slope of the reported over the differenced velocity.
 constexpr double kMinSlope = 0.7, kMaxSlope = 1.3;
@@ -59,8 +80,6 @@ constexpr double kAgree = 0.9;
 
 /// The layout's limit of the hold time.
 constexpr double kMaxHold_s = 0.032;
-/// Silence after the last command, well above the longest hold time.
-constexpr Duration kSilence = 80ms;
 /// Period of the motor context and of the encoder reading.
 constexpr double kFirmwareTolerance_s = 0.001;
 /// Delay of a command on its way to the device, if the device does not acknowledge.
@@ -71,14 +90,10 @@ constexpr double kShortHold_s = 0.008;
 
 /// First sequence of the commands: they wrap in the first series.
 constexpr std::uint64_t kFirstSequence = 65536 - 100;
-constexpr Duration kSeries = 300ms;
 constexpr Duration kSettle = 30ms;
 /// Attempts of a check that a delay of the host can spoil.
 constexpr int kAttempts = 3;
 
-/// Pulses per axis, and the duration of each half.
-constexpr int kPulses = 6;
-constexpr Duration kPulse = 40ms;
 /// Share of the profile's limits that a pulse may have.
 constexpr double kPulseShare = 0.05;
 /// A response is significant if it exceeds this multiple of its standard error.
@@ -107,6 +122,19 @@ struct PulseResponse {
   bool stopped = false;  ///< the handle moved too far
   Vector3d mean = Vector3d::Zero();
   Vector3d error = Vector3d::Zero();  ///< standard error of the mean
+
+  void average(const std::vector<Vector3d>& moved) {
+    const auto n = static_cast<double>(moved.size());
+    mean.setZero();
+    for (const Vector3d& m : moved) mean += m / n;
+    Vector3d squares = Vector3d::Zero();
+    for (const Vector3d& m : moved) squares += (m - mean).cwiseAbs2();
+    error = (squares / (n * std::max(n - 1.0, 1.0))).cwiseSqrt();
+  }
+  bool is_significant(int axis, double least) const {
+    return pulses >= kMinPulses && !stopped &&
+           std::abs(mean[axis]) > std::max(kSignificance * error[axis], least);
+  }
 };
 
 class Conformance {
@@ -117,6 +145,7 @@ class Conformance {
         device_(device),
         user_(user),
         options_(options),
+        pace_(options.brief ? kBrief : kThorough),
         session_(profile, link, clock, user.cancelled) {}
 
   std::vector<RuleResult> run() {
@@ -189,7 +218,7 @@ class Conformance {
   void listen() {
     session_.listen(kEarlierHost);
     session_.clear();
-    session_.listen(kListen);
+    session_.listen(pace_.listen);
     judge_frames();
     valid_.clear();
     for (const ReceivedReport& r : session_.reports())
@@ -221,7 +250,7 @@ class Conformance {
         count([](Decoding d) { return d == Decoding::wrong_length || d == Decoding::wrong_id; });
     const auto corrupt = count([](Decoding d) { return d == Decoding::bad_checksum; });
     std::string seen = fmt::format("{} reports", reports.size());
-    if (reports.empty()) seen = fmt::format("no report in {:.0f} s", seconds(kListen));
+    if (reports.empty()) seen = fmt::format("no report in {:.0f} s", seconds(pace_.listen));
     for (const ReceivedReport& r : reports) {
       if (r.outcome != Decoding::wrong_length && r.outcome != Decoding::wrong_id) continue;
       seen += fmt::format(", {} with another length or id, such as {} bytes, id 0x{:02x}", misshapen,
@@ -317,11 +346,32 @@ class Conformance {
     }
     const VelocityComparison seen = observe_motion();
     const bool order_known = judge_order(seen, angular);
-    judge_velocity(seen, "linear_velocity", 0, linear, true);
-    judge_velocity(seen, "angular_velocity", 3, angular, order_known);
+    judge_velocity(seen, "linear_velocity", 0, linear, true, kTravelByHand);
+    judge_velocity(seen, "angular_velocity", 3, angular, order_known, kTravelByHand);
+  }
+
+  Travel travel_by_pulses() const {
+    return {std::max(kTravelByPulses.m, kTravelPerStep * profile_.pose_report.position.step),
+            std::max(kTravelByPulses.rad, kTravelPerStep * profile_.pose_report.orientation.step)};
+  }
+
+  /// Judges the velocities by the motion of the pulses, where the user moved the handle too little.
+  void judge_velocities_of_pulses() {
+    const VelocityComparison seen = compare_velocities(pulse_motion_);
+    const auto judge = [&](const char* rule, std::size_t first, bool present, bool pose_known) {
+      const auto known =
+          std::find_if(results_.begin(), results_.end(), [&](const RuleResult& r) { return r.rule == rule; });
+      if (!present || known == results_.end() || known->judgement != Judgement::not_judged) return;
+      results_.erase(known);
+      judge_velocity(seen, rule, first, present, pose_known, travel_by_pulses());
+    };
+    judge("linear_velocity", 0, profile_.pose_report.linear_velocity.present, true);
+    judge("angular_velocity", 3, profile_.pose_report.angular_velocity.present,
+          passed("torque_direction") && !failed("quaternion_order"));
   }
 
   VelocityComparison observe_motion() {
+    if (options_.motion_time <= Duration{0}) return {};
     user_.instruct(fmt::format(
         "Move the handle to and fro along all three axes, and turn it about all three, for at most {:.0f} s.",
         seconds(options_.motion_time)));
@@ -331,14 +381,12 @@ class Conformance {
       session_.listen(200ms);
       seen = compare_velocities(motion_samples());
       bool enough = seen.turned_rad >= kMinTurn_rad;
-      for (std::size_t i = 0; i < 6; ++i) enough = enough && seen.axes[i].travel >= travel_needed(i);
+      for (std::size_t i = 0; i < 6; ++i) enough = enough && seen.axes[i].travel >= kTravelByHand.of(i);
       if (enough) break;
     }
     user_.instruct("Now hold the handle still and loosely.");
     return seen;
   }
-
-  static double travel_needed(std::size_t axis) { return axis < 3 ? kTravel_m : kTravel_rad; }
 
   std::vector<MotionSample> motion_samples() const {
     std::vector<MotionSample> samples;
@@ -370,17 +418,18 @@ class Conformance {
   }
 
   void judge_velocity(const VelocityComparison& seen, const char* rule, std::size_t first, bool present,
-                      bool pose_known) {
+                      bool pose_known, const Travel& enough) {
     if (!present || !pose_known) {
       skip(rule,
-           present ? "the order of the quaternion is wrong" : "the profile has none; wrenchd estimates it",
+           present ? "the order of the quaternion is not known to be right"
+                   : "the profile has none; wrenchd estimates it",
            rule_section(4));
       return;
     }
     std::string wrong, right, unmoved;
     for (std::size_t k = 0; k < 3; ++k) {
       const VelocityAgreement& axis = seen.axes[first + k];
-      if (axis.travel < travel_needed(first + k)) {
+      if (axis.travel < enough.of(first + k)) {
         unmoved += fmt::format(" {}", kAxisNames[k]);
         continue;
       }
@@ -454,7 +503,7 @@ class Conformance {
   void judge_acknowledgement() {
     session_.set_sequence(kFirstSequence);
     session_.clear();
-    session_.drive(kSeries, true, kMaxHold_s);
+    session_.drive(pace_.series, true, kMaxHold_s);
     session_.listen(kSettle);
     const auto& commands = session_.commands();
     std::vector<double> latencies_s;
@@ -548,7 +597,7 @@ class Conformance {
       session_.clear();
       session_.drive(20ms, true, hold_s);
       const SentCommand last = session_.commands().back();
-      session_.listen(kSilence);
+      session_.listen(pace_.silence);
       trial = evaluate(last);
     }
     return trial;
@@ -588,7 +637,8 @@ class Conformance {
       skip(rule, "the motors were off before the commands stopped", rule_section(6));
     else if (!trial.off)
       add(rule, false,
-          fmt::format("the motors are still on {} after the last command", milliseconds(seconds(kSilence))),
+          fmt::format("the motors are still on {} after the last command",
+                      milliseconds(seconds(pace_.silence))),
           rule_section(6));
     else
       add(rule, trial.least_s <= limit_s + tolerance_s && trial.tripped,
@@ -634,12 +684,12 @@ class Conformance {
     session_.drive(20ms, true, kMaxHold_s);
     const auto bytes = session_.encoded(session_.sequence(), true, kMaxHold_s);
     session_.clear();
-    for (Duration spent{}; spent < kSilence; spent += DeviceSession::kCommandPeriod)
+    for (Duration spent{}; spent < pace_.silence; spent += DeviceSession::kCommandPeriod)
       session_.send_bytes(bytes);
     const bool off = !latest().motors_on;
     add("repeated_command", off,
         fmt::format("motors {} after {} of the same command", off ? "off" : "on",
-                    milliseconds(seconds(kSilence))),
+                    milliseconds(seconds(pace_.silence))),
         rule_section(5));
   }
 
@@ -720,25 +770,27 @@ class Conformance {
       return;
     }
     user_.instruct(fmt::format("Pulses of at most {:.2f} N and {:.3f} N.m follow.", pulse_N(), pulse_Nm()));
-    judge_direction("force_direction", true, 2.0 * profile_.pose_report.position.step);
+    judge_direction("force_direction", true);
     if (failed("quaternion_order"))
       skip("torque_direction", "the order of the quaternion is wrong", kUnitsSection);
     else
-      judge_direction("torque_direction", false, 4.0 * profile_.pose_report.orientation.step);
+      judge_direction("torque_direction", false);
+    if (reports_valid_ && norm_works_) judge_velocities_of_pulses();
   }
 
+  /// Least displacement that is not a step of the report's numbers.
+  double least_shift(bool force) const {
+    return force ? 2.0 * profile_.pose_report.position.step : 4.0 * profile_.pose_report.orientation.step;
+  }
   double pulse_N() const { return std::min(kMaxPulse_N, kPulseShare * profile_.max_force_N); }
   double pulse_Nm() const { return std::min(kMaxPulse_Nm, kPulseShare * profile_.max_torque_Nm); }
 
-  void judge_direction(const char* rule, bool force, double least) {
+  void judge_direction(const char* rule, bool force) {
     std::string wrong, right, unclear;
     for (int axis = 0; axis < 3; ++axis) {
       const char* name = kAxisNames[static_cast<std::size_t>(axis)];
       const PulseResponse r = apply_pulses(axis, force);
-      const auto significant = [&](int k) {
-        return r.pulses == kPulses && !r.stopped &&
-               std::abs(r.mean[k]) > std::max(kSignificance * r.error[k], least);
-      };
+      const auto significant = [&](int k) { return r.is_significant(k, least_shift(force)); };
       int strongest = 0;
       r.mean.cwiseAbs().maxCoeff(&strongest);
       const std::string part = fmt::format("{}: {:+.3f} {}", name, 1e3 * r.mean[axis], force ? "mm" : "mrad");
@@ -770,19 +822,20 @@ class Conformance {
     PulseResponse response;
     std::vector<Vector3d> moved;
     session_.drive(kSettle, true, kMaxHold_s);
-    while (response.pulses < kPulses && !response.stopped) {
+    // Half a pulse before the first one, so that every pulse begins with the motion of the one before it.
+    session_.drive(pace_.pulse / 2, true, kMaxHold_s, -1.0 * F);
+    while (response.pulses < kMaxPulses && !response.stopped) {
       const Vector3d up = displacement(F, force), down = displacement(-1.0 * F, force);
       ++response.pulses;
       response.stopped = too_far(up, force) || too_far(down, force);
-      if (!response.stopped) moved.push_back(0.5 * (up - down));
+      if (response.stopped) break;
+      moved.push_back(0.5 * (up - down));
+      response.average(moved);
+      int strongest = 0;
+      response.mean.cwiseAbs().maxCoeff(&strongest);
+      if (response.pulses >= pace_.pulses && response.is_significant(strongest, least_shift(force))) break;
     }
-    session_.drive(100ms, true, kMaxHold_s);
-    if (moved.empty()) return response;
-    const auto n = static_cast<double>(moved.size());
-    for (const Vector3d& m : moved) response.mean += m / n;
-    Vector3d squares = Vector3d::Zero();
-    for (const Vector3d& m : moved) squares += (m - response.mean).cwiseAbs2();
-    response.error = (squares / (n * std::max(n - 1.0, 1.0))).cwiseSqrt();
+    session_.drive(pace_.after_axis, true, kMaxHold_s);
     return response;
   }
 
@@ -793,7 +846,9 @@ class Conformance {
   Vector3d displacement(const Wrench& F, bool force) {
     const Pose start = latest().X_BH;
     session_.clear();
-    session_.drive(kPulse, true, kMaxHold_s, F);
+    session_.drive(pace_.pulse, true, kMaxHold_s, F);
+    const std::vector<MotionSample> motion = motion_samples();
+    pulse_motion_.insert(pulse_motion_.end(), motion.begin(), motion.end());
     const Pose& end = latest().X_BH;
     if (force) return end.translation_m - start.translation_m;
     return rotation_vector(
@@ -817,11 +872,13 @@ class Conformance {
   const UsbDevice* device_;
   const ConformanceUser& user_;
   const ConformanceOptions& options_;
+  const Pace& pace_;
   DeviceSession session_;
   std::vector<RuleResult> results_;
   /// Valid reports of listen(). The pointers are valid until the session is cleared.
   std::vector<const ReceivedReport*> valid_;
-  bool reports_valid_ = false;  ///< enough reports of listen() were valid
+  std::vector<MotionSample> pulse_motion_;  ///< reports during the pulses
+  bool reports_valid_ = false;              ///< enough reports of listen() were valid
   bool sequence_works_ = false;
   bool norm_works_ = false;
   bool trusted_ = false;
@@ -847,7 +904,7 @@ bool same_bytes(const Layout& a, const Layout& b, const Report& report) {
 
 }  // namespace
 
-void require_open_layout(const DeviceProfile& profile) {
+bool has_open_layout(const DeviceProfile& profile) {
   const DeviceProfile open = reference_profile();
   const PoseReport pose = distinct_pose(profile.pose_report.linear_velocity.present,
                                         profile.pose_report.angular_velocity.present);
@@ -856,11 +913,14 @@ void require_open_layout(const DeviceProfile& profile) {
   WrenchReport wrench;
   wrench.F = {{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3}};
   wrench.sequence = 0x1234, wrench.hold_time_s = 0.017, wrench.enable = true;
-  if (profile.has_output && profile.more_reports.empty() && profile.stream == StreamStyle::free_running &&
-      same_bytes(profile.pose_report, open.pose_report, pose) &&
-      same_bytes(profile.pose_report, open.pose_report, tripped) &&
-      same_bytes(profile.wrench_report, open.wrench_report, wrench))
-    return;
+  return profile.has_output && profile.more_reports.empty() && profile.stream == StreamStyle::free_running &&
+         same_bytes(profile.pose_report, open.pose_report, pose) &&
+         same_bytes(profile.pose_report, open.pose_report, tripped) &&
+         same_bytes(profile.wrench_report, open.wrench_report, wrench);
+}
+
+void require_open_layout(const DeviceProfile& profile) {
+  if (has_open_layout(profile)) return;
   throw std::runtime_error(
       "profile " + profile.name +
       ": its reports are not those of the open report layout, whose rules this command checks; "

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -11,22 +10,20 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
-#include <linux/sockios.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "config/load_profile.hpp"
+#include "devices/conformance/conformance.hpp"
+#include "devices/conformance/device_session.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/support/firmware_in_hand.hpp"
+#include "tests/support/firmware_mistakes.hpp"
+#include "tests/support/firmware_process.hpp"
 #include "tests/support/machine_load.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 #include "tools/conform.hpp"
-#include "tools/conformance.hpp"
-#include "tools/device_session.hpp"
 
 // wrenchctl conform against the firmware reference of devices/firmware/, as it is and with the mistakes of a
 // maker around it. The firmware itself has no switch for mistakes.
@@ -100,19 +97,6 @@ Rules failed_with(FirmwareMistakes mistakes) {
   return run.with(Judgement::fail);
 }
 
-std::uint16_t u16(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::uint16_t>(bytes[at] | (bytes[at + 1] << 8));
-}
-std::int32_t i32(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::int32_t>(u16(bytes, at) | (static_cast<std::uint32_t>(u16(bytes, at + 2)) << 16U));
-}
-void put_i32(std::span<std::uint8_t> bytes, std::size_t at, std::int32_t value) {
-  for (std::size_t i = 0; i < 4; ++i)
-    bytes[at + i] = static_cast<std::uint8_t>((static_cast<std::uint32_t>(value) >> (8 * i)) & 0xFFU);
-}
-
-constexpr std::size_t kVelocity = 36, kOrientation = 20, kAcknowledged = 61;
-
 bool valid(const CommandBytes& bytes) {
   CommandBytes copy = bytes;
   if (copy.size() != WF_WRENCH_REPORT_BYTES) return false;
@@ -122,26 +106,6 @@ bool valid(const CommandBytes& bytes) {
 /// Distance of a command ahead of the last accepted one.
 std::uint16_t ahead(const CommandBytes& bytes, const wf_firmware& core) {
   return static_cast<std::uint16_t>(u16(bytes, 2) - core.last_sequence);
-}
-
-/// A mistake in the reports; the checksum is right.
-FirmwareMistakes in_reports(std::function<void(ReportBytes&)> change) {
-  FirmwareMistakes m;
-  m.report = [change](ReportBytes& bytes) {
-    change(bytes);
-    seal(bytes);
-  };
-  return m;
-}
-FirmwareMistakes in_commands(std::function<void(CommandBytes&, wf_firmware&)> change) {
-  FirmwareMistakes m;
-  m.command = std::move(change);
-  return m;
-}
-FirmwareMistakes in_motors(std::function<void(wf_wrench&)> change) {
-  FirmwareMistakes m;
-  m.wrench = std::move(change);
-  return m;
 }
 
 }  // namespace
@@ -452,61 +416,6 @@ TEST_CASE("conform accepts profiles of the open report layout only", "[conform]"
 
 // --- the program ------------------------------------------------------------------------------------------
 
-namespace {
-
-/// The firmware in wall time, at the far end of a socket, in a thread.
-class FirmwareProcess final : private ReportSink {
- public:
-  explicit FirmwareProcess(FirmwareMistakes mistakes = {})
-      : device_(reference_profile(), hand(), std::move(mistakes)) {
-    std::array<int, 2> ends{};
-    REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
-    far_ = ends[0], near_ = ends[1];
-    thread_ = std::thread([this] { live(); });
-  }
-  ~FirmwareProcess() {
-    stop_ = true;
-    thread_.join();
-    close(far_);
-    close(near_);
-  }
-  FirmwareProcess(const FirmwareProcess&) = delete;
-  FirmwareProcess& operator=(const FirmwareProcess&) = delete;
-  std::string socket() const { return std::to_string(near_); }
-  bool motors_on() const { return motors_on_; }
-  bool tripped() const { return tripped_; }
-
- private:
-  /// The device is switched on when the program has opened the socket and discarded what waited in it.
-  bool opened() const {
-    int unread = 0;
-    return ioctl(far_, SIOCOUTQ, &unread) == 0 && unread == 0;
-  }
-  void live() {
-    send(far_, "?", 1, MSG_DONTWAIT | MSG_NOSIGNAL);
-    while (!stop_ && !opened()) std::this_thread::sleep_for(200us);
-    while (!stop_) {
-      device_.advance_to(std::chrono::steady_clock::now(), *this);
-      std::array<std::uint8_t, 64> bytes{};
-      for (ssize_t n; (n = recv(far_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0;)
-        device_.take_command(device_.now(), std::span(bytes).first(static_cast<std::size_t>(n)));
-      motors_on_ = device_.firmware().motors_on;
-      tripped_ = device_.firmware().watchdog_tripped;
-      std::this_thread::sleep_for(200us);
-    }
-  }
-  void take_report(TimePoint, std::span<const std::uint8_t> report) noexcept override {
-    send(far_, report.data(), report.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
-  }
-
-  FirmwareInHand device_;
-  int far_ = -1, near_ = -1;
-  std::atomic<bool> stop_{false}, motors_on_{false}, tripped_{false};
-  std::thread thread_;
-};
-
-}  // namespace
-
 TEST_CASE("wrenchctl conform judges a device at the other end of a socket, and its exit code tells",
           "[conform][wall_time]") {
   FirmwareMistakes inverted = in_motors([](wf_wrench& w) {
@@ -514,7 +423,7 @@ TEST_CASE("wrenchctl conform judges a device at the other end of a socket, and i
   });
   const MachineLoad load;
   for (const bool good : {true, false}) {
-    const FirmwareProcess device(good ? FirmwareMistakes{} : inverted);
+    const FirmwareProcess device(hand(), good ? FirmwareMistakes{} : inverted);
     const ProgramResult result =
         run_program("wrenchctl", {"conform", test::source_path("config/profiles/reference_full_speed.toml"),
                                   "--link-fd", device.socket(), "--motion", "5"});
@@ -530,11 +439,12 @@ TEST_CASE("wrenchctl conform judges a device at the other end of a socket, and i
 
 TEST_CASE("a signal ends wrenchctl conform, which releases the device", "[conform][wall_time]") {
   const MachineLoad load;
-  const FirmwareProcess device;
+  const FirmwareProcess device(hand());
   RunningProgram program(
       "wrenchctl", {"conform", test::source_path("config/profiles/reference_full_speed.toml"), "--link-fd",
                     device.socket(), "--motion", "3"});
   REQUIRE_RATE(load, program.wait_for_output("Pulses of at most"));
+  for (int i = 0; i < 100 && !device.motors_on(); ++i) std::this_thread::sleep_for(1ms);
   REQUIRE_RATE(load, device.motors_on());
   program.signal(SIGTERM);
   const ProgramResult result = program.wait();

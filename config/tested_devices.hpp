@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "config/device_file.hpp"
+
+namespace wrenchd {
+
+/// A device that was tested, and the profile with which.
+struct TestedDevice {
+  std::string profile, serial;
+  std::string profile_text;  ///< text of all files of the profile; another text needs another test
+};
+
+/// The devices that have passed the test before their first arming, on disk: a file per device. Not RT-safe:
+/// accesses files.
+class TestedDevices {
+ public:
+  explicit TestedDevices(std::filesystem::path directory = state_directory() / "tested")
+      : directory_(std::move(directory)) {}
+
+  /// Returns false for a device without a serial number, one that was not tested, or was tested with another
+  /// profile text, and if the file is damaged or cannot be read. Never throws for these.
+  bool contains(const TestedDevice& device) const;
+
+  /// Throws std::runtime_error with the remedy if the file cannot be written, and std::invalid_argument if
+  /// the device has no serial number.
+  void add(const TestedDevice& device) const;
+
+ private:
+  std::filesystem::path directory_;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/first_test.hpp"
+#include "devices/conformance/conformance.hpp"
+#include "devices/links/loopback_link.hpp"
+#include "devices/simulation/reference_profile.hpp"
+#include "tests/support/firmware_in_hand.hpp"
+#include "tests/support/firmware_mistakes.hpp"
+#include "tests/support/firmware_process.hpp"
+#include "tests/support/machine_load.hpp"
+#include "tests/support/paths.hpp"
+#include "tests/support/rate_check.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+// The test of a device before it is armed for the first time, with the firmware reference of
+// devices/firmware/ as it is, and with the mistakes of a maker around it.
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using Catch::Contains;
+
+namespace {
+
+/// A hand that holds the handle and does not move it.
+SimulationSettings holding_hand() {
+  SimulationSettings settings;
+  settings.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0.1, 0.0, 0.2}}};
+  settings.hand_repeats = false;
+  return settings;
+}
+
+/// A handle that does not move by the pulses.
+SimulationSettings clamped() {
+  SimulationSettings settings = holding_hand();
+  settings.coulomb_friction_N = 3.0;
+  settings.coulomb_friction_Nm = 0.1;
+  return settings;
+}
+
+struct Bench {
+  explicit Bench(FirmwareMistakes mistakes = {}, const SimulationSettings& hand = holding_hand())
+      : device(reference_profile(), hand, std::move(mistakes)),
+        link(device, clock, hand),
+        tested(files.path()) {
+    config.profile = reference_profile();
+    config.simulated = false;
+    usb.serial = "A1";
+  }
+  std::string run() {
+    return run_first_test(
+        config, link, &usb, clock, [] { return false; }, [](const std::string&) {}, tested);
+  }
+  bool needed() const { return needs_first_test(config, &usb, tested); }
+
+  const TemporaryDirectory files;
+  VirtualClock clock;
+  FirmwareInHand device;
+  LoopbackLink link;
+  RunConfig config;
+  UsbDevice usb;
+  TestedDevices tested;
+};
+
+void check_rejected(const std::string& rule, FirmwareMistakes mistakes) {
+  INFO(rule);
+  Bench bench(std::move(mistakes));
+  const std::string obstacle = bench.run();
+  CHECK_THAT(obstacle, Contains(rule));
+  CHECK_THAT(obstacle, Contains("correct its firmware or its profile"));
+  CHECK(bench.needed());
+  CHECK(bench.device.max_force_N() <= kMaxPulse_N + 1e-6);
+  CHECK(bench.device.max_torque_Nm() <= kMaxPulse_Nm + 1e-6);
+}
+
+}  // namespace
+
+TEST_CASE("a right device passes its first test, and is not tested again", "[first_test]") {
+  Bench bench;
+  CHECK(bench.needed());
+  const TimePoint start = bench.clock.now();
+  CHECK(bench.run() == "");
+  CHECK(seconds(bench.clock.now() - start) < 3.0);
+  CHECK(bench.device.max_force_N() > 0.1);
+  CHECK(bench.device.max_force_N() <= kMaxPulse_N + 1e-6);
+  CHECK_FALSE(bench.needed());
+  bench.usb.serial = "B2";
+  CHECK(bench.needed());
+}
+
+TEST_CASE("a device with a mistake fails its first test, which names the rule", "[first_test]") {
+  check_rejected("force_direction", in_motors([](wf_wrench& w) {
+                   for (std::int32_t& f : w.force_uN) f = -f;
+                 }));
+  check_rejected("force_direction", in_motors([](wf_wrench& w) { std::swap(w.force_uN[0], w.force_uN[1]); }));
+  check_rejected("torque_direction", in_motors([](wf_wrench& w) { w.torque_uNm[2] = -w.torque_uNm[2]; }));
+  check_rejected("torque_direction", in_reports([](ReportBytes& r) {  // w first
+                   std::rotate(r.begin() + kOrientation, r.begin() + kOrientation + 12,
+                               r.begin() + kOrientation + 16);
+                 }));
+  check_rejected("linear_velocity", in_reports([](ReportBytes& r) {
+                   for (std::size_t i = 0; i < 3; ++i)
+                     put_i32(r, kVelocity + 4 * i, -i32(r, kVelocity + 4 * i));
+                 }));
+  check_rejected("linear_velocity", in_reports([](ReportBytes& r) {
+                   for (std::size_t i = 0; i < 3; ++i) put_i32(r, kVelocity + 4 * i, 0);
+                 }));
+  check_rejected("angular_velocity", in_reports([](ReportBytes& r) {
+                   for (std::size_t i = 3; i < 6; ++i)
+                     put_i32(r, kVelocity + 4 * i, -i32(r, kVelocity + 4 * i));
+                 }));
+  check_rejected("acknowledged", in_reports([](ReportBytes& r) { r[kAcknowledged] = 0; }));
+  check_rejected("quaternion_norm", in_reports([](ReportBytes& r) {
+                   for (std::size_t i = 0; i < 4; ++i)
+                     put_i32(r, kOrientation + 4 * i, i32(r, kOrientation + 4 * i) / 2);
+                 }));
+}
+
+TEST_CASE("a device whose force cannot be seen may be armed, and is tested again", "[first_test]") {
+  Bench bench({}, clamped());
+  CHECK(bench.run() == "");
+  CHECK(bench.needed());
+}
+
+TEST_CASE("a device without valid reports fails its first test", "[first_test]") {
+  FirmwareMistakes mistakes;
+  mistakes.report = [](ReportBytes& r) { r.assign(3, 0); };
+  Bench bench(std::move(mistakes));
+  CHECK(bench.run() != "");
+  CHECK(bench.needed());
+}
+
+TEST_CASE(
+    "only devices with motors and the open layout are tested, and only if the configuration asks for it",
+    "[first_test]") {
+  Bench bench;
+  bench.config.settings.device.first_test = false;
+  CHECK_FALSE(bench.needed());
+  bench.config.settings.device.first_test = true;
+  bench.config.profile.pose_report.position.byte = 9;
+  CHECK_FALSE(bench.needed());
+}
+
+TEST_CASE("wrenchd does not arm a device whose force is inverted, whoever asks", "[first_test][wall_time]") {
+  const MachineLoad load;
+  const TemporaryDirectory files;
+  const std::string socket = (files.path() / "control.sock").string();
+  for (const bool good : {true, false}) {
+    FirmwareMistakes inverted = in_motors([](wf_wrench& w) {
+      for (std::int32_t& f : w.force_uN) f = -f;
+    });
+    const FirmwareProcess device(holding_hand(), good ? FirmwareMistakes{} : inverted);
+    RunningProgram wrenchd(
+        "wrenchd", {"--profile", source_path("config/profiles/reference_full_speed.toml"), "--link-fd",
+                    device.socket(), "--realtime", "best_effort", "--control", socket, "--arm"});
+    if (good) {
+      REQUIRE_RATE(load, wrenchd.wait_for_output("active"));
+    } else {
+      REQUIRE_RATE(load, wrenchd.wait_for_output("the device cannot be armed: it failed the test"));
+      const auto status = [&] { return run_program("wrenchctl", {"status", "--socket", socket}).out; };
+      for (int i = 0; i < 100 && status().find("cannot be armed") == std::string::npos; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      CHECK_THAT(status(), Contains("cannot be armed"));
+      const ProgramResult armed = run_program("wrenchctl", {"arm", "--socket", socket});
+      CHECK(armed.exit_code == 1);
+      CHECK_THAT(armed.err, Contains("force_direction"));
+      CHECK(device.max_force_N() <= kMaxPulse_N + 1e-6);
+    }
+    wrenchd.signal(SIGTERM);
+    wrenchd.wait();
+  }
+}
