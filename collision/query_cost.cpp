@@ -50,10 +50,10 @@ Face random_face(const MeshSurface& surface, std::mt19937_64& random) {
 
 /// Returns X moved towards a target by at most these distances.
 Pose moved_towards(const Pose& X, const Pose& target, double most_m, double most_rad) {
-  const Vector3d way_m = target.translation_m - X.translation_m;
-  const double angle = X.rotation.angularDistance(target.rotation), length_m = way_m.norm();
+  const Vector3d path_m = target.translation_m - X.translation_m;
+  const double angle = X.rotation.angularDistance(target.rotation), length_m = path_m.norm();
   return {X.rotation.slerp(angle > most_rad ? most_rad / angle : 1.0, target.rotation).normalized(),
-          X.translation_m + way_m * (length_m > most_m ? most_m / length_m : 1.0)};
+          X.translation_m + path_m * (length_m > most_m ? most_m / length_m : 1.0)};
 }
 
 class CostEstimate {

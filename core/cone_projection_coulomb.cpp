@@ -89,7 +89,7 @@ bool ConeProjection::solve_active() noexcept {
   return false;
 }
 
-/// True if z and the forces obey Coulomb's law, to the tolerance.
+/// True if z and the forces satisfy Coulomb's law, to the tolerance.
 bool ConeProjection::obeys_coulomb(double tolerance_m) const noexcept {
   constexpr double kOutside = 1e-9;  // of the cone, as a coefficient of friction
   for (std::size_t i = 0; i < cones_.size(); ++i) {

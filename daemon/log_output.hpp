@@ -19,7 +19,7 @@ class LogOutput {
  public:
   /// verbose: logs debug lines too. Call it before other threads log.
   explicit LogOutput(bool verbose);
-  /// Calls close(). Later log lines go nowhere.
+  /// Calls close(). Later log lines are dropped.
   ~LogOutput();
   LogOutput(const LogOutput&) = delete;
   LogOutput& operator=(const LogOutput&) = delete;

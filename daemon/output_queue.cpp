@@ -27,7 +27,7 @@ struct OutputQueue::State {
   std::deque<Entry> entries;
   std::size_t bytes = 0;        ///< sum of the bytes of all entries
   std::uint64_t dropped = 0;    ///< since the start
-  std::uint64_t reported = 0;   ///< dropped outputs that report_dropped was told
+  std::uint64_t reported = 0;   ///< dropped outputs that report_dropped has received
   std::uint64_t completed = 0;  ///< outputs that have run
   bool running = false;         ///< an output runs
   bool closing = false;         ///< no more outputs are accepted

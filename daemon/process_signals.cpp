@@ -24,7 +24,7 @@ namespace {
 /// Longest wait for the servo thread to release the hand. A loop that does not tick in this time hangs; then
 /// the writer thread of the link has sent a zero wrench (devices/links/host_watchdog.hpp).
 constexpr long kReleaseWithin_us = 100'000;
-/// Time between two looks at the loop. It ticks once a millisecond, as configured by default.
+/// Period in which the handler samples the loop. It ticks once a millisecond, as configured by default.
 constexpr long kPollPeriod_us = 200;
 /// A thread of the link writes the zero wrench of a release. A process that ends leaves it this time.
 constexpr long kWriteTime_us = 50'000;

@@ -145,7 +145,7 @@ TEST_CASE("the exact test decides faces at rounding distance", "[conforming]") {
   CHECK(exact.intersect(at(0.0)));
   CHECK(exact.intersect(at(-1e-9)));
   CHECK_FALSE(exact.intersect(at(1e-9)));
-  CHECK_FALSE(exact.intersect(at(1e-16)));  // as near as the numbers can be told apart
+  CHECK_FALSE(exact.intersect(at(1e-16)));  // the least distance that the numbers resolve
 }
 
 TEST_CASE("the hand that seeks contact reaches the obstacle, within its speed and reach", "[conforming]") {

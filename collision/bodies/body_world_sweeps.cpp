@@ -8,7 +8,7 @@
 namespace wrenchd {
 namespace {
 
-/// Gap at which a sweep looks past the contacts that are held open, as a multiple of the clearance.
+/// Gap at which a sweep ignores the contacts that are held open, as a multiple of the clearance.
 constexpr double kBehind = 0.1;
 /// If a sweep finds an overlap but no contact, the contacts with a gap below this multiple of the clearance
 /// at the start are added.

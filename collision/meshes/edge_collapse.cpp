@@ -64,15 +64,15 @@ bool EdgeCollapse::Star::set_mean_normal(const Vector3d& n) {
   return true;
 }
 
-std::optional<EdgeCollapse::Placement> EdgeCollapse::find(std::uint32_t half_edge, const Limits& limits) {
+std::optional<EdgeCollapse::Candidate> EdgeCollapse::find(std::uint32_t half_edge, const Limits& limits) {
   needed_m_ = std::numeric_limits<double>::infinity();
   if (!keeps_manifold(half_edge) || !gather(half_edge)) return {};
-  std::optional<Placement> best;
+  std::optional<Candidate> best;
   const auto try_at = [&](const Vector3d& p_m, NewVertex at) {
-    const std::optional<Placement> placement = evaluate(p_m, at, limits);
-    if (!placement) return;
-    needed_m_ = std::min(needed_m_, placement->high_m);
-    if (placement->high_m <= limits.wanted_m && (!best || placement->high_m < best->high_m)) best = placement;
+    const std::optional<Candidate> candidate = evaluate(p_m, at, limits);
+    if (!candidate) return;
+    needed_m_ = std::min(needed_m_, candidate->high_m);
+    if (candidate->high_m <= limits.wanted_m && (!best || candidate->high_m < best->high_m)) best = candidate;
   };
   const auto is_exact = [&] { return best && best->high_m <= star_.high_m + kExact_m; };
   try_at(star_.u_m, NewVertex::at_u);
@@ -147,7 +147,7 @@ std::optional<Vector3d> EdgeCollapse::nearest_enclosing_point(const Limits& limi
 
 /// Returns the bounds for the new faces with the merged vertex at p; nothing if p is not allowed, or not in
 /// any pass.
-std::optional<EdgeCollapse::Placement> EdgeCollapse::evaluate(const Vector3d& p_m, NewVertex at,
+std::optional<EdgeCollapse::Candidate> EdgeCollapse::evaluate(const Vector3d& p_m, NewVertex at,
                                                               const Limits& limits) const {
   double lowest_m = 0.0, highest_m = 0.0;
   for (std::size_t i = 0; i < star_.faces.size(); ++i) {
@@ -166,7 +166,7 @@ std::optional<EdgeCollapse::Placement> EdgeCollapse::evaluate(const Vector3d& p_
     highest_m = rise_m ? *rise_m : std::max(highest_m, largest_ring_height_m());
   }
   if (highest_m > most_m) return {};
-  return Placement{p_m, star_.high_m + highest_m, low_m};
+  return Candidate{p_m, star_.high_m + highest_m, low_m};
 }
 
 /// Returns an upper bound for the height of a new face above an old one, if p is not above the old faces.

@@ -40,7 +40,7 @@ class EdgeCollapse {
     double wanted_m;     ///< the collapse that is looked for leaves its faces no farther than this
   };
   /// A position of the new vertex and bounds for the new faces, see FaceState.
-  struct Placement {
+  struct Candidate {
     Vector3d p_m;
     double high_m, low_m;
   };
@@ -50,16 +50,16 @@ class EdgeCollapse {
 
   /// Returns the best of three positions: u, w, and the enclosing point nearest to the middle of the edge. If
   /// max_rise_m is below the tolerance, only u and w are tried. Returns nothing if none is within `wanted_m`.
-  std::optional<Placement> find(std::uint32_t half_edge, const Limits& limits);
+  std::optional<Candidate> find(std::uint32_t half_edge, const Limits& limits);
 
   /// Returns the least `wanted_m` with which find() would have returned a position for its last edge,
   /// infinity if there is none [m].
   double needed_m() const { return needed_m_; }
 
   /// Returns true if the new vertex replaces u more closely than w. Precondition: find() returned
-  /// `placement`.
-  bool is_nearer_to_u(const Placement& placement) const {
-    return (placement.p_m - star_.u_m).squaredNorm() <= (placement.p_m - star_.w_m).squaredNorm();
+  /// `candidate`.
+  bool is_nearer_to_u(const Candidate& candidate) const {
+    return (candidate.p_m - star_.u_m).squaredNorm() <= (candidate.p_m - star_.w_m).squaredNorm();
   }
 
   /// Calls use(face) for each face around the edge of the last find() that remains.
@@ -105,7 +105,7 @@ class EdgeCollapse {
   bool keeps_manifold(std::uint32_t half_edge);
   bool gather(std::uint32_t half_edge);
   std::optional<Vector3d> nearest_enclosing_point(const Limits& limits);
-  std::optional<Placement> evaluate(const Vector3d& p_m, NewVertex at, const Limits& limits) const;
+  std::optional<Candidate> evaluate(const Vector3d& p_m, NewVertex at, const Limits& limits) const;
   double largest_ring_height_m() const;
   bool new_faces_are_valid(const Vector3d& p_N_m) const;
   std::optional<double> largest_rise_m(const Vector3d& p_N_m, NewVertex at, double most_m) const;

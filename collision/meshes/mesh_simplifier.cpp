@@ -222,7 +222,7 @@ class Simplifier {
     examined_[h] = sweep_;
     needed_m_[h] = std::numeric_limits<float>::infinity();
     if (limits_.max_rise_m < tolerance_m_ && is_corner(u) && is_corner(w)) return false;
-    const std::optional<EdgeCollapse::Placement> best = collapse_.find(h, limits_);
+    const std::optional<EdgeCollapse::Candidate> best = collapse_.find(h, limits_);
     needed_m_[h] = static_cast<float>(collapse_.needed_m());
     if (best) apply(h, *best);
     return best.has_value();
@@ -242,13 +242,13 @@ class Simplifier {
     return planes.full();
   }
 
-  void apply(std::uint32_t h, const EdgeCollapse::Placement& placement) {
+  void apply(std::uint32_t h, const EdgeCollapse::Candidate& candidate) {
     const std::uint32_t u = mesh_.from(h), w = mesh_.to(h);
-    if (!collapse_.is_nearer_to_u(placement)) source_[u] = source_[w];
-    mesh_.collapse(h, placement.p_m);
+    if (!collapse_.is_nearer_to_u(candidate)) source_[u] = source_[w];
+    mesh_.collapse(h, candidate.p_m);
     collapse_.for_each_remaining_face([&](std::uint32_t f) {
-      faces_[f].high_m = placement.high_m;
-      faces_[f].low_m = placement.low_m;
+      faces_[f].high_m = candidate.high_m;
+      faces_[f].low_m = candidate.low_m;
       update_face(f);
     });
     // Every edge with an end on the ring sees another star now.

@@ -8,7 +8,7 @@
 namespace wrenchd {
 
 /// What State::waiting waits for: a valid proxy, a slow handle, and a small contact wrench at full authority.
-/// With the numbers that the condition compares, so that a person can be told which of them keeps the force
+/// With the numbers that the condition compares, so that a text can name which of them keeps the force
 /// away.
 struct CalmCondition {
   bool proxy_valid = false;

@@ -14,16 +14,19 @@
 #include <CLI/CLI.hpp>
 
 #include "collision/proxy.hpp"
+#include "core/metric.hpp"
 #include "tests/bench/statistics.hpp"
 #include "tests/support/conforming_scene.hpp"
 #include "tests/support/exact_intersection.hpp"
+#include "tests/support/independent_descent.hpp"
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/unbalanced_pull.hpp"
 
 // Twenty scenes with rough manipulation, tools caged in closed shells, and scenes of fine meshes that touch
 // face to face. The program checks every pose of the proxy in exact arithmetic, which takes minutes to hours;
 // a test does the same for a few hundred poses. It also computes the residual of every pose that is called
-// converged from its contacts. With --moving the obstacles also move, as fast as hands do. With --surface the
+// converged from its contacts. With --descents a random search, which knows nothing of contacts, looks for
+// closer poses. With --moving the obstacles also move, as fast as hands do. With --surface the
 // obstacles of the twenty scenes are surfaces; the shells always are.
 
 namespace {
@@ -31,9 +34,12 @@ namespace {
 using namespace wrenchd;
 using namespace wrenchd::test;
 
-struct Tally {
+struct Counts {
   long overlaps = 0, caught = 0, free = 0, converged = 0, budget_spent = 0, jumps = 0;
-  long untrue = 0;  ///< ticks called converged whose contacts do not balance the pull to kOptimalResidual
+  long untrue = 0;    ///< ticks called converged whose contacts do not balance the pull to kOptimalResidual
+  long descents = 0;  ///< converged poses at which a random search looked for closer ones
+  long improved = 0;  ///< poses whose energy it lowered by more than kMaxImprovement
+  double most_lowered = 0.0;  ///< largest fraction by which it lowered an energy
   std::uint32_t most_visits = 0;
   double latest_s = 0.0;  ///< scene time at which the obstacles were last updated
   double worst_residual = 0.0;
@@ -41,6 +47,10 @@ struct Tally {
 };
 
 constexpr double kTick_s = 1e-3;
+/// Fraction of its energy by which no converged pose may be improved.
+constexpr double kMaxImprovement = 1e-3;
+/// Steps of one random search.
+constexpr int kDescentSteps = 400;
 
 /// Returns a random translation, rotation or both, which reverses periodically.
 ObstacleMotion random_motion(std::uint64_t seed) {
@@ -195,8 +205,8 @@ bool jumped(const ConformingCase& of, const Pose& X_SC_before, const Pose& X_SC_
 }
 
 template <class Hand, class Jumped>
-Tally handle(const Vector3d& start_m, Hand hand, const Bodies& bodies, long poses,
-             const ObstacleMotion& motion, const Jumped& jumped) {
+Counts handle(const Vector3d& start_m, Hand hand, const Bodies& bodies, long poses, long descents,
+              const ObstacleMotion& motion, const Jumped& jumped) {
   const Scene& scene = bodies.scene;
   const MeshObstacle& obstacle = scene.meshes()[0];
   const ExactIntersection exact(bodies.tool_E, bodies.obstacle_O);
@@ -204,17 +214,17 @@ Tally handle(const Vector3d& start_m, Hand hand, const Bodies& bodies, long pose
   Proxy proxy(scene);
   const Pose X_OT_start = X_OS * Pose{Quaterniond::Identity(), start_m} * X_CT;
   Pose X_WQ = obstacle.X_WO * X_OT_start, X_OQ = X_OT_start;
-  Tally tally;
+  Counts counts;
   for (long n = 1; n <= poses; ++n) {
     const double time_s = static_cast<double>(n) * kTick_s;
     const Pose X_WP = hand.next() * X_CT;
     const auto begin = std::chrono::steady_clock::now();
     const Projection q = proxy.follow(X_WP, X_WQ, time_s);
-    tally.tick_us.push_back(
+    counts.tick_us.push_back(
         std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
-    tally.most_visits = std::max(tally.most_visits, proxy.node_visits());
+    counts.most_visits = std::max(counts.most_visits, proxy.node_visits());
     if (q.status == ProjectionStatus::infeasible) {  // the servo loop reinitializes the proxy in this case
-      ++tally.caught;
+      ++counts.caught;
       X_OQ = X_OT_start;
       X_WQ = obstacle.X_WO_at(time_s) * X_OQ;
       proxy.clear_history(time_s);
@@ -223,21 +233,31 @@ Tally handle(const Vector3d& start_m, Hand hand, const Bodies& bodies, long pose
     X_WQ = q.X_WQ;
     const Pose X_OQ_last = X_OQ;
     X_OQ = inverse(obstacle.X_WO_at(proxy.admissible_time_s())) * X_WQ;
-    tally.jumps += jumped(X_SO * X_OQ_last * bodies.X_TC, X_SO * X_OQ * bodies.X_TC) ? 1 : 0;
-    tally.overlaps += exact.intersect(X_OQ * bodies.X_TE) ? 1 : 0;
-    tally.free += q.status == ProjectionStatus::free ? 1 : 0;
-    tally.budget_spent += q.status == ProjectionStatus::budget_spent ? 1 : 0;
-    if (motion.moves()) tally.latest_s = std::max(tally.latest_s, time_s - proxy.admissible_time_s());
+    counts.jumps += jumped(X_SO * X_OQ_last * bodies.X_TC, X_SO * X_OQ * bodies.X_TC) ? 1 : 0;
+    counts.overlaps += exact.intersect(X_OQ * bodies.X_TE) ? 1 : 0;
+    counts.free += q.status == ProjectionStatus::free ? 1 : 0;
+    counts.budget_spent += q.status == ProjectionStatus::budget_spent ? 1 : 0;
+    if (motion.moves()) counts.latest_s = std::max(counts.latest_s, time_s - proxy.admissible_time_s());
     if (q.status == ProjectionStatus::converged) {
-      ++tally.converged;
-      tally.worst_residual = std::max(tally.worst_residual, q.kkt_residual);
+      ++counts.converged;
+      counts.worst_residual = std::max(counts.worst_residual, q.kkt_residual);
       // The contacts of moving obstacles are stated for other poses than the scene's.
       const bool true_optimum = motion.moves() ? q.kkt_residual <= kOptimalResidual
                                                : unbalanced_pull(scene, X_WP, q) <= kOptimalResidual;
-      tally.untrue += true_optimum ? 0 : 1;
+      counts.untrue += true_optimum ? 0 : 1;
+      const long due = descents > 0 ? counts.descents * poses / descents : poses;
+      if (n > due && q.energy > 0.0 && !motion.moves()) {
+        const Inertia& M = scene.tool().solid.inertia;
+        const double least = descend_at_random(exact, M, X_WP, X_WQ, obstacle.X_WO, bodies.X_TE,
+                                               static_cast<std::uint64_t>(n), kDescentSteps);
+        const double lowered = 1.0 - least / energy(M, X_WP, X_WQ);
+        ++counts.descents;
+        counts.improved += lowered > kMaxImprovement ? 1 : 0;
+        counts.most_lowered = std::max(counts.most_lowered, lowered);
+      }
     }
   }
-  return tally;
+  return counts;
 }
 
 }  // namespace
@@ -252,6 +272,10 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--seed", seed, "seed of the hand's motion")->capture_default_str();
   app.add_option("--only", only, "runs only scenes whose name contains this text");
+  long descents = 0;
+  app.add_option("--descents", descents, "number of random searches for closer poses per scene")
+      ->check(CLI::Range(0L, 100000000L))
+      ->capture_default_str();
   bool moving = false;
   app.add_flag("--moving", moving, "the obstacles move too, at random");
   bool surfaces = false;
@@ -266,14 +290,14 @@ int main(int argc, char** argv) {
   std::atomic<long> faults = 0;
   struct Task {
     std::string name;
-    std::function<Tally(const ObstacleMotion&)> run;
+    std::function<Counts(const ObstacleMotion&)> run;
   };
   std::vector<Task> tasks;
   for (ManipulationCase handling : manipulation_cases()) {
     handling.obstacle_kind = surfaces ? BodyKind::surface : BodyKind::solid;
     tasks.push_back({handling.name, [=](const ObstacleMotion& motion) {
                        return handle(handling.start_m, HandTrajectory(handling, seed),
-                                     bodies_of(handling, motion), poses, motion,
+                                     bodies_of(handling, motion), poses, descents, motion,
                                      [&](const Pose& before, const Pose& after) {
                                        return jumped(handling, before, after);
                                      });
@@ -282,7 +306,7 @@ int main(int argc, char** argv) {
   for (const ConformingManipulation& conforming : conforming_manipulations())
     tasks.push_back({conforming.handling.name, [&, conforming](const ObstacleMotion& motion) {
                        return handle(conforming.handling.start_m, HandTrajectory(conforming.handling, seed),
-                                     bodies_of(conforming, motion), poses, motion,
+                                     bodies_of(conforming, motion), poses, descents, motion,
                                      [&](const Pose& before, const Pose& after) {
                                        return jumped(conforming_case(conforming.of), before, after);
                                      });
@@ -291,7 +315,7 @@ int main(int argc, char** argv) {
     tasks.push_back({cage.name, [&](const ObstacleMotion& motion) {
                        const TriangleMesh shell = shell_of(cage);
                        return handle(Vector3d::Zero(), CagedHand(seed), bodies_of(cage, motion), poses,
-                                     motion,
+                                     descents, motion,
                                      [&](const Pose&, const Pose& after) { return escaped(shell, after); });
                      }});
   const auto work = [&] {
@@ -299,7 +323,7 @@ int main(int argc, char** argv) {
       const Task& task = tasks[i];
       if (task.name.find(only) == std::string::npos) continue;
       const ObstacleMotion motion = moving ? random_motion(100 * seed + i) : ObstacleMotion{};
-      const Tally t = task.run(motion);
+      const Counts t = task.run(motion);
       const auto times = bench::quantiles(t.tick_us);
       const std::lock_guard lock(printing);
       std::printf("%-42s %9ld %8ld %5ld %9ld %9ld %6ld %7ld %7ld %6u %8.1f %8.1e %8.1f %8.0f\n",
@@ -307,6 +331,10 @@ int main(int argc, char** argv) {
                   t.budget_spent, t.caught, t.most_visits, 1e3 * t.latest_s, t.worst_residual, times.p50,
                   times.max);
       std::fflush(stdout);
+      if (descents > 0)
+        std::printf(
+            "%-42s %9ld random searches, %ld lowered the energy by more than 0.1 %%, at most %.2g %%\n", "",
+            t.descents, t.improved, 100.0 * t.most_lowered);
       faults += t.overlaps + t.jumps + t.untrue + (moving ? 0 : t.caught);
     }
   };

@@ -231,15 +231,15 @@ TEST_CASE("a moving obstacle carries the tool with friction, and not without", "
   }
   CHECK(X_WQ.translation_m.z() ==
         Approx(scene.meshes()[0].X_WO_at(0.1).translation_m.z() + 0.035).margin(1e-7));
-  const double way_m = (X_ride.translation_m - above_m).head<2>().norm() +
-                       0.03 * X_ride.rotation.angularDistance(Quaterniond::Identity());
+  const double path_m = (X_ride.translation_m - above_m).head<2>().norm() +
+                        0.03 * X_ride.rotation.angularDistance(Quaterniond::Identity());
   const double behind_m = (X_ride.translation_m - X_WQ.translation_m).norm() +
                           0.03 * X_ride.rotation.angularDistance(X_WQ.rotation);
-  CHECK(way_m > 1e-3);
+  CHECK(path_m > 1e-3);
   if (mu > 0.0)
-    CHECK(behind_m < 0.02 * way_m);
+    CHECK(behind_m < 0.02 * path_m);
   else
-    CHECK(behind_m > 0.5 * way_m);
+    CHECK(behind_m > 0.5 * path_m);
 }
 
 TEST_CASE("following moving obstacles neither allocates nor locks", "[moving][realtime]") {

@@ -56,10 +56,10 @@ Rolled roll(const Scene& scene, double speed_m_per_s, double seconds) {
   const Inertia& M = scene.tool().solid.inertia;
   constexpr double kRadius_m = 0.03;
   const auto hand = [&](double t_s) {
-    const double way_m = t_s < 0.5 * seconds ? speed_m_per_s * t_s : speed_m_per_s * (seconds - t_s);
+    const double path_m = t_s < 0.5 * seconds ? speed_m_per_s * t_s : speed_m_per_s * (seconds - t_s);
     const Quaterniond tilt = rotation_from({0.0, 0.0, 0.3});  // not along a row of vertices
-    return Pose{rotation_from({0.0, way_m / kRadius_m, 0.0}) * tilt,
-                {way_m - 0.05, 0.003, kRadius_m - 0.002}};
+    return Pose{rotation_from({0.0, path_m / kRadius_m, 0.0}) * tilt,
+                {path_m - 0.05, 0.003, kRadius_m - 0.002}};
   };
   Rolled rolled;
   Pose X_WQ = hand(0.0);

@@ -136,7 +136,7 @@ TEST_CASE("a compensated handle stays in place and coasts after a push", "[gravi
     const Pose start = handle.X_BH;
     pushed.v_C = random.vector<3>(0.1);
     pushed.w = random.vector<3>(0.5);
-    const double pushed_J = pushed.kinetic_J();
+    const double hand_work_J = pushed.kinetic_J();
     for (int k = 0; k < 1000; ++k) {
       handle.step(gravity.wrench(handle.X_BH), h);
       pushed.step(gravity.wrench(pushed.X_BH), h);
@@ -145,7 +145,7 @@ TEST_CASE("a compensated handle stays in place and coasts after a push", "[gravi
     }
     CHECK((handle.X_BH.translation_m - start.translation_m).norm() < 1e-9);
     CHECK(handle.X_BH.rotation.angularDistance(start.rotation) < 1e-9);
-    CHECK(pushed.kinetic_J() == Approx(pushed_J).epsilon(1e-9));
+    CHECK(pushed.kinetic_J() == Approx(hand_work_J).epsilon(1e-9));
     // Without compensation it falls freely; with nine tenths of its mass compensated, by a tenth of that.
     CHECK(falling.v_C.norm() == Approx(g).epsilon(1e-9));
     CHECK(sagging.v_C.norm() == Approx(0.1 * g).epsilon(1e-9));

@@ -164,10 +164,10 @@ TEST_CASE("a decaying motion is not an oscillation, and the detector can be rese
     OscillationDetector detector;
     double amplitude_m = 5e-3;
     for (int swing = 0; swing < 8; ++swing) {
-      const double way_m = (swing % 2 == 0 ? 1.0 : -1.0) * amplitude_m;
+      const double path_m = (swing % 2 == 0 ? 1.0 : -1.0) * amplitude_m;
       for (int i = 0; i < 10; ++i)
         detector.update({{-3.0, 0.0, 0.0}, Vector3d::Zero()},
-                        {{way_m / (10 * kTick_s), 0.0, 0.0}, Vector3d::Zero()}, kTick_s, true);
+                        {{path_m / (10 * kTick_s), 0.0, 0.0}, Vector3d::Zero()}, kTick_s, true);
       amplitude_m *= kept;
     }
     CHECK(detector.oscillates() == (kept > 0.9));

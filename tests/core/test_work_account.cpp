@@ -76,7 +76,7 @@ Pose rounded(const Pose& X, const EncoderStep& step) {
 
 struct Balance {
   double declared_J = 0.0;
-  double given_J = 0.0;           ///< By the wrench that does the most work among those that may act.
+  double delivered_J = 0.0;       ///< By the wrench that does the most work among those that may act.
   double largest_excess_J = 0.0;  ///< Given beyond declared, at the worst time.
 };
 
@@ -93,8 +93,8 @@ Balance run_against_worst_delay(RandomValues& random, std::size_t delay_ticks, c
     handle.move();
     double most_J = handle.work_J(under_way.front());
     for (const Wrench& F : under_way) most_J = std::max(most_J, handle.work_J(F));
-    balance.given_J += most_J;
-    balance.largest_excess_J = std::max(balance.largest_excess_J, balance.given_J - balance.declared_J);
+    balance.delivered_J += most_J;
+    balance.largest_excess_J = std::max(balance.largest_excess_J, balance.delivered_J - balance.declared_J);
     if (random.chance(0.02)) {
       const double energy_J = random.uniform(0.0, 0.02);
       // The account holds at most its maximum.
@@ -115,15 +115,15 @@ Balance run_against_worst_delay(RandomValues& random, std::size_t delay_ticks, c
 
 TEST_CASE("an external wrench gives no more energy than declared, at any delay", "[work_account]") {
   RandomValues random(11);
-  double given_J = 0.0;
+  double delivered_J = 0.0;
   for (int run = 0; run < 60; ++run) {
     const auto delay = static_cast<std::size_t>(random.integer(1, 8));
     const Balance balance = run_against_worst_delay(random, delay, {}, 1.0);
     INFO("run " << run << ", delay " << delay << ", declared " << balance.declared_J);
     CHECK(balance.largest_excess_J <= 1e-9);
-    given_J = std::max(given_J, balance.given_J / balance.declared_J);
+    delivered_J = std::max(delivered_J, balance.delivered_J / balance.declared_J);
   }
-  CHECK(given_J > 0.5);  // it uses what was declared
+  CHECK(delivered_J > 0.5);  // it uses what was declared
 }
 
 TEST_CASE("encoder steps give an external wrench no energy", "[work_account]") {
@@ -141,16 +141,16 @@ TEST_CASE("a program that knows the pose better than the encoders gains nothing"
   WorkAccount account({1, {kStep_m, 0.0}});
   account.deposit(kDeclared_J);
   account.permit({}, at({0, 0, 0}), 0.0, kTick_s);
-  double given_J = 0.0, x_m = 0.0;
+  double delivered_J = 0.0, x_m = 0.0;
   for (int k = 1; k <= 4000; ++k) {
     const double next_m = 0.49 * kStep_m * std::sin(0.05 * k);  // the reported position never changes
     const Wrench F = account.permit(force(next_m > x_m ? 10.0 : -10.0), at({0, 0, 0}), kTick_s, kTick_s);
     account.record_sent(F);
-    given_J += F.force_N.x() * (next_m - x_m);
+    delivered_J += F.force_N.x() * (next_m - x_m);
     x_m = next_m;
   }
-  CHECK(given_J <= kDeclared_J);
-  CHECK(given_J > 0.5 * kDeclared_J);
+  CHECK(delivered_J <= kDeclared_J);
+  CHECK(delivered_J > 0.5 * kDeclared_J);
 }
 
 TEST_CASE("with energy in reserve the external wrench is as requested", "[work_account]") {

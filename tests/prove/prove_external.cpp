@@ -86,7 +86,7 @@ RunConfig config_of(RandomValues& random, bool contact) {
 
 struct Totals {
   long programs = 0, violations = 0, limits_broken = 0, too_fast = 0, other_faults = 0;
-  double worst_J = -1.0, given_J = 0.0, declared_J = 0.0;
+  double worst_J = -1.0, delivered_J = 0.0, declared_J = 0.0;
 };
 
 /// A loop with a hand, on which one program after the other acts.
@@ -122,7 +122,7 @@ class Run {
     ++totals_.programs;
     totals_.worst_J = std::max(totals_.worst_J, worst_J_);
     totals_.violations += worst_J_ > kViolation_J ? 1 : 0;
-    totals_.given_J += std::max(ledger_J() - start_J_, 0.0);
+    totals_.delivered_J += std::max(ledger_J() - start_J_, 0.0);
     totals_.declared_J += declared_J_;
     for (int k = 0; k < 60 && active(); ++k) tick();
   }
@@ -219,8 +219,8 @@ int main(int argc, char** argv) {
   std::printf(
       "prove_external programs %ld violations %ld worst_J %.3g limits_broken %ld overspeed %ld other_faults "
       "%ld declared_J %.3g "
-      "given_J %.3g\n",
+      "delivered_J %.3g\n",
       totals.programs, totals.violations, totals.worst_J, totals.limits_broken, totals.too_fast,
-      totals.other_faults, totals.declared_J, totals.given_J);
+      totals.other_faults, totals.declared_J, totals.delivered_J);
   return totals.violations + totals.limits_broken > 0 ? 1 : 0;
 }

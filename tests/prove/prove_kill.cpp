@@ -82,13 +82,13 @@ class FarSide final : private ReportSink {
       : step_(from_seconds(1.0 / (16.0 * profile.report_rate_Hz))), device_(profile, pressing_hand()) {
     device_.advance_to(wall_now(), *this);
   }
-  ~FarSide() { hang_up(); }
+  ~FarSide() { disconnect(); }
   FarSide(const FarSide&) = delete;
   FarSide& operator=(const FarSide&) = delete;
 
   /// Returns the daemon's end of a new socket.
   int plug() {
-    hang_up();
+    disconnect();
     std::array<int, 2> ends{};
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
       throw std::system_error(errno, std::generic_category(), "socketpair");
@@ -135,7 +135,7 @@ class FarSide final : private ReportSink {
   void take_report(TimePoint, std::span<const std::uint8_t> report) noexcept override {
     if (socket_ >= 0) send(socket_, report.data(), report.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
   }
-  void hang_up() {
+  void disconnect() {
     if (socket_ >= 0) ::close(socket_);
     socket_ = -1;
   }

@@ -82,7 +82,7 @@ class HotplugEvents {
 // --- the servo loop ---------------------------------------------------------------------------------------
 
 /// Observations of a run of ticks.
-struct Seen {
+struct Observed {
   int ticks = 0;
   int fresh = 0;
   std::uint64_t missing = 0, skipped = 0, rejected = 0;
@@ -107,17 +107,17 @@ class Servo {
   bool armed() const { return armed_; }
 
   /// The observations start when `begin` is called, after a few ticks.
-  Seen run_ticks(int n, const std::function<void()>& begin) {
+  Observed run_ticks(int n, const std::function<void()>& begin) {
     constexpr int kLeadIn = 16;
     return run(n, TimePoint::max(), kLeadIn, begin);
   }
-  Seen run_for(Duration d) {
+  Observed run_for(Duration d) {
     return run(1 << 20, SteadyClock::now() + d, 0, [] {});
   }
 
  private:
-  Seen run(int most, TimePoint until, int lead_in, const std::function<void()>& begin) {
-    Seen seen;
+  Observed run(int most, TimePoint until, int lead_in, const std::function<void()>& begin) {
+    Observed seen;
     seen.work.swap(work_);
     set_own_priority(kPriority);
     TimePoint began = SteadyClock::now();
@@ -186,7 +186,7 @@ class Servo {
   bool armed_ = false;
 };
 
-std::string summary(const Seen& seen) {
+std::string summary(const Observed& seen) {
   std::string s =
       format("%d ticks, %d fresh, %" PRIu64 " missing, %" PRIu64 " skipped, %" PRIu64
              " rejected, longest gap %.3f ms, ",
@@ -264,7 +264,7 @@ void steady(const Budget& budget, int factor) {
   Session s(budget.backend, budget.rate_Hz);
   s.arm();
   DeviceRecord before;
-  const Seen seen = s.servo.run_ticks(ticks, [&] { before = s.far.record(); });
+  const Observed seen = s.servo.run_ticks(ticks, [&] { before = s.far.record(); });
   const DeviceRecord after = s.far.record();
 
   std::vector<Duration> turn_around = s.far.turn_arounds();
@@ -304,11 +304,11 @@ void bad_reports(Backend backend, Trouble trouble, const char* what, bool reject
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(trouble);
-  const Seen during = s.servo.run_for(100ms);
+  const Observed during = s.servo.run_for(100ms);
   const DeviceRecord stopped = s.far.record();
   s.far.set(Trouble::none);
   s.servo.run_for(5ms);  // the first sample after the silence still has its fault
-  const Seen after = s.servo.run_for(50ms);
+  const Observed after = s.servo.run_for(50ms);
   row.saw(summary(during));
   row.saw("then " + summary(after));
   CHECK_THAT(row, during.fault == Fault::sample_stale);
@@ -327,7 +327,7 @@ void duplicates(Backend backend) {
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::duplicates);
-  const Seen during = s.servo.run_for(100ms);
+  const Observed during = s.servo.run_for(100ms);
   s.far.set(Trouble::none);
   row.saw(summary(during));
   CHECK_THAT(row, during.fault == Fault::none && s.servo.armed());
@@ -341,9 +341,9 @@ void late(Backend backend) {
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::silent);
-  const Seen during = s.servo.run_for(10ms);
+  const Observed during = s.servo.run_for(10ms);
   s.far.set(Trouble::none);
-  const Seen after = s.servo.run_for(20ms);
+  const Observed after = s.servo.run_for(20ms);
   row.saw(summary(during));
   row.saw("then " + summary(after));
   CHECK_THAT(row, during.fault == Fault::none && after.fault == Fault::none && s.servo.armed());
@@ -357,7 +357,7 @@ void stalled_once(Backend backend) {
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::stalled_once);
-  const Seen seen = s.servo.run_for(100ms);
+  const Observed seen = s.servo.run_for(100ms);
   row.saw(summary(seen));
   row.saw(format("%" PRIu64 " halts cleared", s.far.record().halts_cleared));
   CHECK_THAT(row, s.far.record().halts_cleared >= 1);
@@ -371,11 +371,11 @@ void stalled(Backend backend) {
   Session s(backend, 1000.0);
   s.arm();
   s.far.set(Trouble::stalled);
-  const Seen during = s.servo.run_for(100ms);
+  const Observed during = s.servo.run_for(100ms);
   const DeviceRecord stopped = s.far.record();
   s.far.set(Trouble::none);
-  const Seen until_heard = s.servo.run_for(200ms);
-  const Seen after = s.servo.run_for(50ms);
+  const Observed until_heard = s.servo.run_for(200ms);
+  const Observed after = s.servo.run_for(50ms);
   row.saw(summary(during));
   row.saw(format("%" PRIu64 " halts cleared", s.far.record().halts_cleared));
   row.saw("then " + summary(after));
@@ -395,10 +395,10 @@ void blocked_output(Backend backend) {
   s.arm();
   const DeviceRecord before = s.far.record();
   s.far.set(Trouble::blocked);
-  const Seen during = s.servo.run_for(100ms);
+  const Observed during = s.servo.run_for(100ms);
   const DeviceRecord stopped = s.far.record();
   s.far.set(Trouble::none);
-  const Seen after = s.servo.run_for(50ms);
+  const Observed after = s.servo.run_for(50ms);
   const DeviceRecord freed = s.far.record();
   s.arm();
   row.saw(summary(during));
@@ -465,7 +465,7 @@ void unplugged(Backend backend, HotplugEvents& events) {
     std::this_thread::sleep_for(10500us);
     s.far.unplug();
   });
-  const Seen seen = s.servo.run_for(1s);
+  const Observed seen = s.servo.run_for(1s);
   hand.join();
   CHECK_THAT(row, events.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
   if (backend == Backend::hidraw)  // libusb detached the kernel driver, so the node is gone
@@ -490,10 +490,10 @@ void unplugged(Backend backend, HotplugEvents& events) {
   device.open();
   Servo servo(device, 1000.0);
   servo.run_for(5ms);
-  const Seen disarmed = servo.run_for(50ms);
+  const Observed disarmed = servo.run_for(50ms);
   const bool off = !back.record().motors_on;
   servo.arm();
-  const Seen armed = servo.run_for(50ms);
+  const Observed armed = servo.run_for(50ms);
   row.saw("again " + summary(armed));
   CHECK_THAT(row, off && disarmed.fault == Fault::none && disarmed.fresh >= 49);
   CHECK_THAT(row, armed.fault == Fault::none && back.record().motors_on);
@@ -508,7 +508,7 @@ void unplugged_in_a_write(Backend backend) {
   s.far.set(Trouble::blocked);
   s.servo.run_for(20ms);
   s.far.unplug();
-  const Seen seen = s.servo.run_for(1s);
+  const Observed seen = s.servo.run_for(1s);
   const Duration took = s.close();
   row.saw(summary(seen));
   row.saw(format("closed in %.3f ms", ms(took)));
@@ -534,7 +534,7 @@ void another_device(Backend backend, const char* what, const UsbipDevice::Identi
     rejection = e.what();
   }
   s.servo.arm();
-  const Seen seen = s.servo.run_for(20ms);
+  const Observed seen = s.servo.run_for(20ms);
   std::this_thread::sleep_for(20ms);
   row.saw(rejection.empty() ? "opened" : rejection);
   CHECK_THAT(row, found.port_path == s.listed.port_path);

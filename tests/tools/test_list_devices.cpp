@@ -144,7 +144,7 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
 }
 
 TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_devices]") {
-  // The id does not identify a Polhem: wrenchd must be told.
+  // The id does not identify a Polhem: the user must name it.
   const std::string teensy = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
   CHECK(holds(teensy, "\n    polhem: 16c0:0486 is the id of every Teensy of PJRC"));
   CHECK(holds(teensy, "set profile = \"polhem\" in [device] of wrenchd.toml"));

@@ -74,7 +74,7 @@ TEST_CASE("a new scene with an obstacle lowers the tool until it touches", "[new
   CHECK(largest_force_N(name / "wrenchd.toml") > 0.5);
 }
 
-TEST_CASE("an open mesh becomes a surface, and the user is told why", "[new_scene]") {
+TEST_CASE("an open mesh becomes a surface, and the output says why", "[new_scene]") {
   const TemporaryDirectory dir;
   const fs::path name = dir.path() / "mine";
   const ProgramResult made =

@@ -20,7 +20,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Crease angle for simplified meshes, where a few cells may bend a smooth surface by more than kCrease_rad.
+/// Crease angle for simplified meshes, where a few cells may turn a smooth surface by more than kCrease_rad.
 constexpr double kCoarseCrease_rad = 1.0;
 
 struct Surface {
@@ -141,8 +141,8 @@ void append(std::vector<float>& to, const Vector3d& v) {
 }
 
 void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
-  const double bend = std::cos(kCrease_rad);
-  const double line_bend = made_coarser ? std::cos(kCoarseCrease_rad) : bend;
+  const double crease_cosine = std::cos(kCrease_rad);
+  const double line_cosine = made_coarser ? std::cos(kCoarseCrease_rad) : crease_cosine;
   std::vector<Vector3d> areas, normals;
   for (const Triangle& t : s.triangles) {
     areas.push_back(s.area(t));
@@ -167,7 +167,7 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
       const std::uint32_t w = s.triangles[i][static_cast<std::size_t>((k + 1) % 3)];
       Vector3d normal = Vector3d::Zero();
       for (const std::uint32_t j : around.of(v))
-        if (normals[j].dot(normals[i]) >= bend) normal += areas[j];
+        if (normals[j].dot(normals[i]) >= crease_cosine) normal += areas[j];
       out.indices.push_back(corner(v, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized())));
       int others = 0;
       double straightest = -1.0;
@@ -177,7 +177,7 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
         ++others;
         straightest = std::max(straightest, normals[j].dot(normals[i]));
       }
-      if (others > 0 && (straightest >= line_bend || v > w))
+      if (others > 0 && (straightest >= line_cosine || v > w))
         continue;                                 // only one of the two triangles draws their common edge
       if (made_coarser && others != 1) continue;  // open edges at merged cells are not edges of the body
       append(out.lines, s.vertices[v]);

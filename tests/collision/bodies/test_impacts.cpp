@@ -98,7 +98,7 @@ TEST_CASE("a body that hardly rebounds comes to rest, and falls asleep", "[impac
   CHECK(world.motion(1).X_WB.translation_m.z() == Approx(0.025).epsilon(1e-6));
 }
 
-TEST_CASE("two bodies that meet head-on obey the law of Newton and conserve momentum", "[impacts]") {
+TEST_CASE("two bodies that meet head-on satisfy the law of Newton and conserve momentum", "[impacts]") {
   const Scene scene(box(Vector3d::Constant(0.05), 0.1), {});
   for (const double e : {0.0, 0.3, 1.0}) {
     FreeBody light = body_at({-0.1, 0.0, 0.0}, box(Vector3d::Constant(0.05), 0.1), 0.0);

@@ -355,7 +355,7 @@ TEST_CASE("invalid STL files are rejected") {
       {"no_end.stl", ascii.substr(0, ascii.size() - 13), "", "ends before 'endsolid'; the file is truncated"},
       {"cut_binary.stl", binary.substr(0, binary.size() - 1), "", "has 684 bytes, not 683: it is truncated"},
       {"count.stl", counted, "", "a binary STL file of 4000000000 triangles has 200000000084 bytes, not 684"},
-      {"too_long.stl", binary + binary.substr(84), "", "not 1284"},
+      {"overlong.stl", binary + binary.substr(84), "", "not 1284"},
       {"nan_binary.stl", nan, "", "face 2: corner 1 is not a finite number"},
       {"nan_ascii.stl", replaced(ascii, "vertex -1 ", "vertex nan "), ":4",
        "expected three finite numbers, found 'nan'"},

@@ -32,9 +32,9 @@ TEST_CASE("a predictor without motion predicts no motion", "[motion_predictor]")
 TEST_CASE("the prediction of a tool that moves with the hand is correct", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
-  const double way_m = apart_m(hand(100), hand(120));
+  const double path_m = apart_m(hand(100), hand(120));
   CHECK(apart_m(motion.predict(0), hand(100)) < 1e-15);
-  CHECK(apart_m(motion.predict(20), hand(120)) < 0.02 * way_m);
+  CHECK(apart_m(motion.predict(20), hand(120)) < 0.02 * path_m);
   // A parabola of 2e-7 m per tick^2 deviates from its chord by an eighth of that times 20^2.
   CHECK(motion.chord_deviation_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
 }
@@ -74,8 +74,8 @@ TEST_CASE("a deferred tick predicts the tool where it would have moved", "[motio
   CHECK_FALSE(motion.has_observation());
   for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
   for (int i = 101; i <= 104; ++i) motion.observe_deferred(hand(i));
-  const double way_m = apart_m(hand(100), hand(104));
-  CHECK(apart_m(motion.predict(0), hand(104)) < 0.02 * way_m);
+  const double path_m = apart_m(hand(100), hand(104));
+  CHECK(apart_m(motion.predict(0), hand(104)) < 0.02 * path_m);
   CHECK(apart_m(motion.predict(20), hand(124)) < 0.02 * apart_m(hand(104), hand(124)));
 }
 

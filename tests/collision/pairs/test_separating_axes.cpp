@@ -42,8 +42,8 @@ TEST_CASE("separating axes never separate a pair that meets on the path, at any 
     const Vector3d where = random.log_uniform(1e-3, 1.0) * random.unit<3>();
     const Triangle b = triangle(random, where, size_m);
     const Triangle start = triangle(random, where + 0.5 * size_m * random.unit<3>(), size_m);
-    const Vector3d way_m = size_m * random.log_uniform(1e-4, 3.0) * random.unit<3>();
-    Triangle end = moved(start, way_m);
+    const Vector3d path_m = size_m * random.log_uniform(1e-4, 3.0) * random.unit<3>();
+    Triangle end = moved(start, path_m);
     for (Vector3d& p : end) p += 0.1 * size_m * random.unit<3>();  // includes a rotation
     bool meets = false;
     for (int k = 0; k <= 20 && !meets; ++k) meets = triangles_intersect(between(start, end, k / 20.0), b);

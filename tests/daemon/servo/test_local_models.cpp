@@ -203,7 +203,7 @@ TEST_CASE("what the springs hold after fading in at rest is what the fade gave t
     for (std::uint32_t id = 0; id < 3; ++id) set.add(random_model(random, id, TimePoint(from_seconds(1e6))));
     models.set_models(set);
     const Pose X_WH = random.pose(0.05);
-    double given_J = 0.0, stored_J = 0.0, most_J = 0.0;
+    double delivered_J = 0.0, stored_J = 0.0, most_J = 0.0;
     for (int i = 0; i < 400; ++i) {
       if (i == 120) {  // two of them are moved elsewhere
         LocalModelSet moved;
@@ -215,10 +215,10 @@ TEST_CASE("what the springs hold after fading in at rest is what the fade gave t
       }
       if (i == 280) models.set_models({});
       const auto step = models.evaluate(X_WH, {}, TimePoint{}, kTick_s, 0.5);
-      given_J += step.crossfade_work_J;
+      delivered_J += step.crossfade_work_J;
       stored_J = step.stored_energy_J;
       most_J = std::max(most_J, stored_J);
-      REQUIRE(given_J == Approx(stored_J).margin(1e-12));
+      REQUIRE(delivered_J == Approx(stored_J).margin(1e-12));
       CHECK(step.any_active == (i < 280 + 50));
     }
     CHECK(stored_J == 0.0);

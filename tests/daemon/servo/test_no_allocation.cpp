@@ -93,7 +93,7 @@ TEST_CASE("no fault makes the loop allocate, lock or touch a page for the first 
   CHECK(allocations == 0);
   CHECK(locks == 0);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  // Seen: up to 13, the first rings and queues of a process that has not locked its memory. A loop that
+  // Observed: up to 13, the first rings and queues of a process that has not locked its memory. A loop that
   // touches a new page in each case has more than 200.
   CHECK(page_faults <= 50);
 #endif

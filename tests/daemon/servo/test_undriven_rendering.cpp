@@ -39,9 +39,9 @@ Pose loop_motion(double t_s, double sense) {
 
 /// Work of a force on the hand: given and taken.
 struct Work {
-  double given_J = 0.0, taken_J = 0.0;
-  void add(double J) { (J > 0.0 ? given_J : taken_J) += std::abs(J); }
-  double net_J() const { return given_J - taken_J; }
+  double delivered_J = 0.0, taken_J = 0.0;
+  void add(double J) { (J > 0.0 ? delivered_J : taken_J) += std::abs(J); }
+  double net_J() const { return delivered_J - taken_J; }
 };
 
 struct Result {

@@ -104,7 +104,7 @@ TEST_CASE("the reason is the first condition that does not hold, with its number
   }
   SECTION("the handle moves") {
     calm.demand.calm.speed_m_per_s = 0.12;
-    calm.demand.calm.force_N = 6.1;  // a hand in motion is told to stop first
+    calm.demand.calm.force_N = 6.1;  // a hand in motion must stop first
     CHECK(text(calm) == "the handle moves at 0.12 m/s: hold it below 0.05 m/s");
   }
   SECTION("the handle turns") {
@@ -139,7 +139,7 @@ TEST_CASE("the reason is the first condition that does not hold, with its number
   }
 }
 
-TEST_CASE("a hand that stands in the table is told after a second, once, how to get out", "[wait_reason]") {
+TEST_CASE("a hand that stands in the table reads after a second, once, how to get out", "[wait_reason]") {
   WaitReason last;
   const std::vector<std::string> texts = waits_at(0.0055, last);  // the cube would rest at 25 mm
   REQUIRE(texts.size() == 1);

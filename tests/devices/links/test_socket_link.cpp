@@ -30,8 +30,8 @@ struct Pair {
     far = ends[0];
     near = ends[1];
   }
-  ~Pair() { hang_up(); }
-  void hang_up() {
+  ~Pair() { disconnect(); }
+  void disconnect() {
     if (far >= 0) ::close(far);
     far = -1;
   }
@@ -110,7 +110,7 @@ TEST_CASE("when the other end of a socket closes, the device is disconnected", "
   link.open();
   std::array<std::uint8_t, 4> buffer{};
   pair.say({1});
-  pair.hang_up();
+  pair.disconnect();
   CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // a report sent before the end
   CHECK(link.read(kNow, buffer).status == LinkStatus::disconnected);
   CHECK(written_until(link, Bytes{1}, LinkStatus::disconnected));

@@ -72,7 +72,8 @@ TEST_CASE("the page cannot call what arms, moves the hand or administers", "[vie
   CHECK(daemon.requested_methods().empty());
 }
 
-TEST_CASE("a page that calls faster than the daemon replies is told so, and no call is lost", "[view]") {
+TEST_CASE("a page that calls faster than the daemon replies receives an error, and no call is lost",
+          "[view]") {
   StubDaemon daemon;
   daemon.stop_answering();
   Replies replies;

@@ -24,22 +24,22 @@ def main():
     run = wrenchd.DaemonRun(sys.argv[1], seconds=2.0)
     table = wrenchd.sweep(run, grid, out="stable_stiffness.csv", engine=2)
 
-    felt = np.array([row[STIFFNESS] * row["stiffness_scale"] for row in table.rows]).reshape(len(grid[STIFFNESS]), len(grid[DELAY]))
+    stable = np.array([row[STIFFNESS] * row["stiffness_scale"] for row in table.rows]).reshape(len(grid[STIFFNESS]), len(grid[DELAY]))
     figure, axes = plt.subplots(figsize=(6, 4))
-    image = axes.imshow(felt, origin="lower", aspect="auto")
+    image = axes.imshow(stable, origin="lower", aspect="auto")
     axes.set_xticks(range(len(grid[DELAY])), [f"{1e3 * d:g}" for d in grid[DELAY]])
     axes.set_yticks(range(len(grid[STIFFNESS])), grid[STIFFNESS])
     axes.set_xlabel("delay from the host to the motors [ms]")
     axes.set_ylabel("stiffness in the configuration [N/m]")
-    for (i, j), value in np.ndenumerate(felt):
+    for (i, j), value in np.ndenumerate(stable):
         axes.text(j, i, f"{value:.0f}", ha="center", va="center", color="white")
     figure.colorbar(image, label="stiffness that the hand feels [N/m]")
     figure.savefig("stable_stiffness.svg")
-    print("stable for each delay:", {f"{1e3 * d:g} ms": f"{felt[:, j].max():.0f} N/m" for j, d in enumerate(grid[DELAY])})
+    print("stable for each delay:", {f"{1e3 * d:g} ms": f"{stable[:, j].max():.0f} N/m" for j, d in enumerate(grid[DELAY])})
 
     assert all("error" not in row for row in table.rows)
-    assert (np.diff(felt.max(axis=0)) <= 1e-9).all(), "a longer delay permits no higher stiffness"
-    assert felt[-1, -1] < grid[STIFFNESS][-1], "the highest stiffness at the longest delay is scaled down"
+    assert (np.diff(stable.max(axis=0)) <= 1e-9).all(), "a longer delay permits no higher stiffness"
+    assert stable[-1, -1] < grid[STIFFNESS][-1], "the highest stiffness at the longest delay is scaled down"
 
 
 if __name__ == "__main__":  # the processes of the sweep import this file

@@ -92,7 +92,7 @@ class Recording:
     Raises RecordingError, with the place and the remedy, if the file is not a recording of the format that this module
     reads, or if it is damaged.
 
-    ticks: numpy structured array, one row per tick. contact_rows: likewise for contacts. fields: Field by table and
+    ticks: numpy structured array, one row per tick. contact_rows: the same for contacts. fields: Field by table and
     name, as recording.fields["ticks"]["F_out"]. settings, scene, profile: texts of the configuration of the run.
     config: all texts by name. attributes: of the file, such as "rate_Hz" and "started_utc".
     """
@@ -158,7 +158,7 @@ class Recording:
 
     @property
     def time_s(self):
-        """Time of each tick since the first tick, [s], float64 of shape (N,). wrenchctl export computes it likewise."""
+        """Time of each tick since the first tick, [s], float64 of shape (N,). wrenchctl export computes the same."""
         return 1e-9 * (self.ticks["now_ns"] - self.ticks["now_ns"][:1]).astype(np.float64)
 
     def frame(self, columns=None, conditions=True):

@@ -271,8 +271,8 @@ class _Progress:
 
 def _identity(function, points):
     """A digest of what determines the table: the points, and what the function says of itself."""
-    told = getattr(function, "identity", None)
-    what = told() if callable(told) else f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__name__)}"
+    identity = getattr(function, "identity", None)
+    what = identity() if callable(identity) else f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__name__)}"
     return hashlib.sha256(json.dumps([what, points], sort_keys=True).encode()).hexdigest()
 
 
@@ -515,23 +515,23 @@ def load_sweep(file):
 
     file = Path(file)
     try:
-        told = tomllib.loads(file.read_text(encoding="utf-8"))
+        parsed = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise SweepError(f"{file}: cannot be read ({error.strerror}); name a sweep file") from error
     except tomllib.TOMLDecodeError as error:
         raise SweepError(f"{file}: {error}") from error
     known = {"": {"out": str, "engine": (str, int), "run": dict, "grid": dict}, "run": {"config": str, "seconds": (int, float)}}
     for place, keys in known.items():
-        for key, found in (told if not place else told.get(place, {})).items():
+        for key, found in (parsed if not place else parsed.get(place, {})).items():
             name = f"{place}.{key}".lstrip(".")
             if key not in keys:
                 raise SweepError(f"{file}: '{name}' is no key of a sweep; the keys are {', '.join(keys)}")
             if not isinstance(found, keys[key]) or isinstance(found, bool):
                 raise SweepError(f"{file}: '{name}' has a wrong type: {found!r}")
     for key in ("out", "grid", "run"):
-        if key not in told:
+        if key not in parsed:
             raise SweepError(f"{file}: '{key}' is missing; see the guide of tools, Sweeps")
-    if "config" not in told["run"]:
+    if "config" not in parsed["run"]:
         raise SweepError(f"{file}: 'run.config' is missing; name a wrenchd.toml")
     grid = {}
 
@@ -542,13 +542,13 @@ def load_sweep(file):
             else:
                 grid[prefix + key] = found
 
-    flatten(told["grid"], "")
+    flatten(parsed["grid"], "")
     try:
         grid_points(grid)
     except SweepError as error:
         raise SweepError(f"{file}: {error}") from error
-    function = DaemonRun(file.parent / told["run"]["config"], told["run"].get("seconds", 5.0))
-    return function, grid, file.parent / told["out"], told.get("engine", "serial")
+    function = DaemonRun(file.parent / parsed["run"]["config"], parsed["run"].get("seconds", 5.0))
+    return function, grid, file.parent / parsed["out"], parsed.get("engine", "serial")
 
 
 def main(arguments=None):
