@@ -149,26 +149,6 @@ TEST_CASE("without a profile name wrenchd selects the profile of the device", "[
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
 }
 
-TEST_CASE("a device is tested over hidraw before it is armed for the first time, and remembered", "[usb]") {
-  const MachineLoad load;
-  MockMachine machine;
-  const TemporaryDirectory files;
-  const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
-  for (const bool first : {true, false}) {
-    setenv("STATE_DIRECTORY", files.path().c_str(), 1);
-    RunningProgram wrenchd("wrenchd",
-                           {"--profile", "reference_full_speed", "--realtime", "best_effort", "--arm"});
-    unsetenv("STATE_DIRECTORY");
-    if (first)
-      REQUIRE_RATE(load, wrenchd.wait_for_output("the device passed its test; wrenchd remembers it"));
-    REQUIRE_RATE(load, wrenchd.wait_for_output("ramping"));
-    CHECK((wrenchd.err().find("is tested before it is armed") != std::string::npos) == first);
-    CHECK(std::filesystem::exists(files.path() / "tested/reference_full_speed@A1.toml"));
-    wrenchd.signal(SIGTERM);
-    wrenchd.wait();
-  }
-}
-
 TEST_CASE("a device that requires calibration is not armed before it", "[usb]") {
   const MachineLoad load;
   MockMachine machine;
