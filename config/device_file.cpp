@@ -149,7 +149,7 @@ fs::path device_file(const fs::path& directory, std::string_view kind, std::stri
   return directory / name;
 }
 
-std::string with_checksum(std::string text) {
+std::string with_checksum(const std::string& text) {
   return text + checksum_line(text);
 }
 

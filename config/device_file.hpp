@@ -28,7 +28,7 @@ std::filesystem::path device_file(const std::filesystem::path& directory, std::s
                                   std::string_view profile, std::string_view serial);
 
 /// Returns the text and a last line with its checksum.
-std::string with_checksum(std::string text);
+std::string with_checksum(const std::string& text);
 /// True if the last line is the checksum of all lines before it.
 bool has_valid_checksum(const std::string& text);
 
