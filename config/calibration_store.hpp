@@ -40,7 +40,7 @@ class CalibrationStore {
   /// crash the old or the new file is present, and possibly a hidden .part file.
   void write(const Calibration& calibration) const;
 
-  /// See device_file().
+  /// Returns the file of one device, as device_file() names it. Throws as device_file().
   std::filesystem::path file_of(std::string_view profile, std::string_view serial) const;
 
  private:

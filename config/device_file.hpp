@@ -33,7 +33,8 @@ std::string with_checksum(const std::string& text);
 bool has_valid_checksum(const std::string& text);
 
 /// Returns the bytes of a file; nothing if it does not exist. Throws ConfigError if it cannot be read, is no
-/// regular file, or is larger than 64 KiB. cure: ends the text of the last two.
+/// regular file, or is larger than 64 KiB. cure: end of the message about
+/// a file that is not regular or too large.
 std::optional<std::string> read_device_file(const std::filesystem::path& file, const std::string& cure);
 
 /// Writes a file, and makes its directory if necessary: to a temporary file, then a rename. After a crash the

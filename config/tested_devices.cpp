@@ -8,7 +8,7 @@ namespace {
 
 constexpr const char* kKind = "device test";
 
-/// The checksum of the profile text tells texts apart; both files are written by the same user.
+/// Returns the content of the file of a device. It contains the checksum of the profile text, not the text.
 std::string content_of(const TestedDevice& device) {
   const std::string with_sum = with_checksum(device.profile_text);
   return with_checksum("# wrenchd device test 1\n# passed with the profile of\n" +
@@ -23,7 +23,7 @@ bool TestedDevices::contains(const TestedDevice& device) const {
     return read_device_file(device_file(directory_, kKind, device.profile, device.serial), {}) ==
            content_of(device);
   } catch (const std::exception&) {
-    return false;  // the device is tested once more
+    return false;  // wrenchd then tests the device again
   }
 }
 

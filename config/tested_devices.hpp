@@ -3,12 +3,13 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "config/device_file.hpp"
 
 namespace wrenchd {
 
-/// A device that was tested, and the profile with which.
+/// A device and the profile with which it was tested.
 struct TestedDevice {
   std::string profile, serial;
   std::string profile_text;  ///< text of all files of the profile; another text needs another test
@@ -21,8 +22,8 @@ class TestedDevices {
   explicit TestedDevices(std::filesystem::path directory = state_directory() / "tested")
       : directory_(std::move(directory)) {}
 
-  /// Returns false for a device without a serial number, one that was not tested, or was tested with another
-  /// profile text, and if the file is damaged or cannot be read. Never throws for these.
+  /// Returns true if the device has passed the test with this text of its profile. Returns false if its file
+  /// is absent, damaged or unreadable, and for a device without a serial number. Throws nothing.
   bool contains(const TestedDevice& device) const;
 
   /// Throws std::runtime_error with the remedy if the file cannot be written, and std::invalid_argument if

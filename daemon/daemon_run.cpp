@@ -271,13 +271,13 @@ void open_simulated(Hand& hand) {
   log_missing_motors(hand.runtime.config().profile);
 }
 
-/// Tests a device in another process before it is armed. It has no serial number, so the test is not
-/// remembered.
+/// Tests a device in another process before it is armed. Such a device has no serial number, so it is tested
+/// at each start.
 void test_first(Hand& hand, Clock& clock, TimePoint end) {
   const RunConfig& config = hand.runtime.config();
   const TestedDevices tested;
   if (hand.device.simulated != nullptr || !needs_first_test(config, nullptr, tested)) return;
-  hand.runtime.set_arming_obstacle("it is being tested; wait some seconds");
+  hand.runtime.set_arming_obstacle(kTestRuns);
   const StopCondition stop = [&] { return hand.context.stop_requested() || clock.now() >= end; };
   const ReportWaiting waiting = [&](const std::string& reason) {
     hand.context.service.waiting(reason, hand.context.hand);

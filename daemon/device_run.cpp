@@ -13,8 +13,9 @@
 namespace wrenchd {
 namespace {
 
-/// Returns why the opened device must not be armed, with the remedy; "" if it may. A device that was never
-/// armed is tested, and opened again; nothing: it cannot be opened again.
+/// Returns why the opened device must not be armed, with the remedy; "" if the device may be armed. Tests a
+/// device that needs its first test, and opens it again; returns nothing if the device cannot be opened
+/// again.
 std::optional<std::string> find_obstacle(Runtime& runtime, ReconnectingLink& link, WallClock& clock,
                                          const StopCondition& stop, const ReportWaiting& waiting) {
   const UsbDevice device = link.device().value();
@@ -47,7 +48,7 @@ Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingL
     if (at_start) log_device(profile, device);
     if (at_start) log_missing_motors(profile);
     if (!at_start) spdlog::info("the device is connected again, and is disarmed: {}", describe(device));
-    runtime.set_arming_obstacle("it is being tested; wait some seconds");
+    runtime.set_arming_obstacle(kTestRuns);
     const std::optional<std::string> obstacle = find_obstacle(runtime, link, clock, stop, waiting);
     if (!obstacle && stop()) return Fault::none;
     if (!obstacle) continue;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <string_view>
 
 #include <spdlog/spdlog.h>
@@ -12,8 +13,6 @@
 
 namespace wrenchd {
 namespace {
-
-constexpr int kAttempts = 2;
 
 /// Rules that concern how a device is found. wrenchd has found it.
 constexpr std::array<std::string_view, 3> kIdentityRules = {"report_descriptor", "usb_id", "serial_number"};
@@ -32,17 +31,14 @@ const RuleResult* find_rule(const Results& results, const std::string& rule) {
   return found == results.end() ? nullptr : &*found;
 }
 
-/// The rules that are broken in all attempts, as the last attempt saw them.
-Results broken_rules(const Results& last, const Results& broken_before, bool is_first) {
-  Results broken;
-  for (const RuleResult& result : last) {
-    const bool names_device =
-        std::find(kIdentityRules.begin(), kIdentityRules.end(), result.rule) != kIdentityRules.end();
-    if (result.judgement == Judgement::fail && !names_device &&
-        (is_first || find_rule(broken_before, result.rule) != nullptr))
-      broken.push_back(result);
-  }
-  return broken;
+/// Returns the failed rules that concern how the device behaves.
+Results failed_rules(const Results& results) {
+  Results failed;
+  std::copy_if(results.begin(), results.end(), std::back_inserter(failed), [](const RuleResult& result) {
+    return result.judgement == Judgement::fail &&
+           std::find(kIdentityRules.begin(), kIdentityRules.end(), result.rule) == kIdentityRules.end();
+  });
+  return failed;
 }
 
 bool passed(const Results& results, const std::string& rule) {
@@ -75,10 +71,11 @@ std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbD
   const ConformanceOptions options = {Duration{0}, true, true};
   Results results, broken;
   try {
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    results = check_conformance(config.profile, link, device, clock, user, options);
+    broken = failed_rules(results);
+    if (!broken.empty()) {
       results = check_conformance(config.profile, link, device, clock, user, options);
-      broken = broken_rules(results, broken, attempt == 0);
-      if (broken.empty()) break;
+      std::erase_if(broken, [&](const RuleResult& rule) { return passed(results, rule.rule); });
     }
   } catch (const std::runtime_error& error) {
     return std::string("the test before its first arming did not end: ") + error.what();
@@ -89,7 +86,7 @@ std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbD
   log_not_judged(results);
   if (!broken.empty())
     return "it failed the test before its first arming: " + broken.front().rule + ", " + broken.front().seen +
-           "; correct its firmware or its profile, wrenchctl conform names every rule";
+           "; correct its firmware or its profile: wrenchctl conform prints the result of every rule";
   const DofMask driven = driven_dofs(config.profile);
   if ((driven & kLinearDofs) != 0 && !passed(results, "force_direction")) return {};
   if ((driven & kAngularDofs) != 0 && !passed(results, "torque_direction")) return {};

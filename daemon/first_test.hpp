@@ -16,12 +16,16 @@ namespace wrenchd {
 /// device that is not on USB, which is tested at each start. Not RT-safe: reads a file.
 bool needs_first_test(const RunConfig& config, const UsbDevice* device, const TestedDevices& tested);
 
-/// Tests a device before it is armed for the first time: check_conformance() without a moving hand, within
-/// seconds. A rule counts as broken if it fails twice, because a delay of this machine can spoil one attempt.
-/// Logs each broken rule, and what the test could not judge. Remembers a device whose force and torque have
-/// been seen to be right. Returns why the device must not be armed, with the remedy; "" if it may.
-/// Precondition: the link is closed; it is closed afterwards. Throws nothing that the device causes. Not
-/// RT-safe: takes seconds.
+/// Reason why a device cannot be armed while run_first_test() tests it.
+inline constexpr const char* kTestRuns = "its first test runs; try again in some seconds";
+
+/// Tests a device before it is armed for the first time: check_conformance() without a moving hand. If a rule
+/// fails, the test runs a second time, because a delay of this machine can spoil a test; a rule that fails in
+/// the first test and does not pass in the second is broken. Logs each broken rule, and each rule that the
+/// test could not judge. Stores in `tested` that a device passed if the test saw the direction of its force
+/// and torque. Returns why the device must not be armed, with the remedy; "" if the device may be armed.
+/// Precondition: the link is closed; it is closed afterwards. An error of the device is returned, not thrown.
+/// Not RT-safe: takes seconds.
 std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbDevice* device, Clock& clock,
                            const StopCondition& stop, const ReportWaiting& waiting,
                            const TestedDevices& tested);

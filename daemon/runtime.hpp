@@ -75,10 +75,10 @@ class Runtime {
   /// The device, for homing. Precondition: no servo thread runs.
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
-  /// Forbids arming, whoever asks for it, for this reason, which ends with a remedy; "" permits it. Any
-  /// thread.
+  /// If the reason is not empty, no client, button or option of the command line can arm the loop. The reason
+  /// ends with a remedy. An empty reason permits arming. Any thread.
   void set_arming_obstacle(std::string reason);
-  /// Returns why the device must not be armed; "" if it may. Any thread.
+  /// Returns the reason of set_arming_obstacle(). Any thread.
   std::string arming_obstacle() const;
   /// Changes scene, rendering and limits while the loop runs.
   Reconfigurator& reconfigurator() noexcept { return reconfigurator_; }

@@ -73,8 +73,9 @@ class LocalExtremes {
   }
 
  private:
-  /// Looks for z with n . z >= kSlope for the unit vectors n from the neighbours to the vertex. The shorter
-  /// the least z is, the sharper is the corner.
+  /// Returns true if a z exists with n . z >= kSlope for the unit vectors n from all neighbours to the
+  /// vertex. The plane through the vertex with normal z then separates the vertex from its neighbours. If the
+  /// shortest z is longer than kSlope / kRounding, the vertex counts as flat.
   bool is_extreme(std::size_t v) {
     const auto around = neighbours_.of(v);
     if (around.empty() || around.size() > kMaxNeighbours) return true;
@@ -97,10 +98,9 @@ class LocalExtremes {
   }
 
   static constexpr std::size_t kMaxNeighbours = 64;
-  /// A vertex that is higher above all its neighbours than this fraction of its edges is no result of
-  /// rounding.
+  /// Height of a vertex above its neighbours, as a fraction of its edges, that rounding explains.
   static constexpr double kRounding = 1e-12;
-  static constexpr double kSlope = 1e-6;
+  static constexpr double kSlope = 1e-6;  ///< scale of the problem; the result does not depend on it
 
   const TriangleMesh& mesh_;
   Neighbours neighbours_;

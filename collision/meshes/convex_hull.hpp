@@ -14,9 +14,9 @@ namespace wrenchd {
 /// seconds.
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m);
 
-/// Returns the convex hull of a mesh: that of its vertices. Vertices that lie in the convex hull of their
-/// neighbours, up to rounding, are left out first. Fine flat and curved walls, where most points are of this
-/// kind and exact arithmetic decides, take a small part of the time of the points alone. Not RT-safe.
+/// Returns the convex hull of the vertices of a mesh. First discards each vertex that lies in the convex hull
+/// of its neighbours, up to rounding. This is faster than convex_hull() of the points if the mesh has many
+/// triangles in flat or singly curved walls. Not RT-safe: allocates, may take seconds.
 ConvexBody convex_hull(const TriangleMesh& mesh);
 
 /// Returns the volume of a convex body [cube of the vertices' unit]. RT-safe.

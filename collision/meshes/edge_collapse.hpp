@@ -37,7 +37,7 @@ class EdgeCollapse {
     double size_m;       ///< largest distance of a vertex from the origin
     double tolerance_m;  ///< no face may be farther than this from the original surface
     double max_rise_m;   ///< no collapse may raise the surface by more than this
-    double wanted_m;     ///< the collapse that is looked for leaves its faces no farther than this
+    double wanted_m;     ///< find() returns only a collapse that leaves its faces no farther than this
   };
   /// A position of the new vertex and bounds for the new faces, see FaceState.
   struct Candidate {

@@ -47,8 +47,8 @@ class HalfEdgeMesh {
   std::size_t face_count() const { return triangles_.size(); }
   std::size_t vertex_count() const { return vertices_m_.size(); }
 
-  /// Calls use(half-edge) for each half-edge that leaves the start of `first`, which comes first,
-  /// anticlockwise as seen from outside.
+  /// Calls use(half-edge) for each half-edge that leaves the start of `first`: begins with `first`, and goes
+  /// on anticlockwise as seen from outside.
   template <class Use>
   void for_each_outgoing_from(std::uint32_t first, const Use& use) const {
     std::uint32_t h = first;
@@ -84,7 +84,8 @@ class HalfEdgeMesh {
  private:
   /// Returns false unless every edge has exactly one half-edge in each direction.
   bool pair_half_edges() {
-    // The half-edges of both directions in order of their smaller end; the few at one vertex are searched.
+    // Groups the half-edges by the smaller number of their ends. Sorting each small group then brings the two
+    // directions of an edge together.
     std::vector<std::uint32_t> begin(vertices_m_.size() + 1, 0), at_vertex(half_edge_count());
     const auto smaller_end = [&](std::uint32_t h) { return std::min(from(h), to(h)); };
     for (std::uint32_t h = 0; h < half_edge_count(); ++h) ++begin[smaller_end(h) + 1];

@@ -37,7 +37,7 @@ class RequestInbox {
     held_.fetch_or(commands, std::memory_order_relaxed);
     request(commands);
   }
-  /// While arming is forbidden, take() drops requests to arm. For a device that no force may drive yet.
+  /// If `permitted` is false, take() drops requests to arm until arming is permitted again.
   void permit_arming(bool permitted) noexcept {
     arming_permitted_.store(permitted, std::memory_order_relaxed);
   }

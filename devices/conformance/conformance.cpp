@@ -27,16 +27,17 @@ using namespace std::chrono_literals;
 
 /// Least and largest number of pulses along an axis.
 constexpr int kMinPulses = 3, kMaxPulses = 6;
+
 /// Durations of the parts of a check.
 struct Pace {
-  /// Time in which the device is only observed: the jitter of the host changes a rate over it by less than 1
-  /// %, over the brief one by a few per cent.
+  /// Time in which the check only observes the device. The jitter of the host changes a rate over one second
+  /// by less than 1 %.
   Duration listen;
-  Duration series;      ///< the first commands
-  Duration silence;     ///< after the last command, well above the longest hold time
-  int pulses;           ///< along each axis, more if their effect is not clear
+  Duration series;      ///< duration of the first commands
+  Duration silence;     ///< time without commands, longer than the longest hold time
+  int pulses;           ///< number along each axis; up to kMaxPulses if the response is not significant
   Duration pulse;       ///< each half of a pulse
-  Duration after_axis;  ///< in which the handle comes to rest
+  Duration after_axis;  ///< time after the pulses along an axis, in which the handle comes to rest
 };
 constexpr Pace kThorough = {1s, 300ms, 80ms, kMaxPulses, 40ms, 100ms};
 constexpr Pace kBrief = {300ms, 120ms, 45ms, kMinPulses, 30ms, 30ms};
@@ -66,7 +67,7 @@ struct Travel {
   double of(std::size_t axis) const { return axis < 3 ? m : rad; }
 };
 constexpr Travel kTravelByHand = {0.010, 0.10};
-/// Pulses move the handle much less. Steps of its encoders must not decide: see travel_by_pulses().
+/// Path length for the motion by pulses. It is at least kTravelPerStep steps of the report's numbers.
 constexpr Travel kTravelByPulses = {0.0005, 0.005};
 constexpr double kTravelPerStep = 20.0;
 constexpr double kMinTurn_rad = 0.2;
@@ -250,7 +251,7 @@ class Conformance {
         count([](Decoding d) { return d == Decoding::wrong_length || d == Decoding::wrong_id; });
     const auto corrupt = count([](Decoding d) { return d == Decoding::bad_checksum; });
     std::string seen = fmt::format("{} reports", reports.size());
-    if (reports.empty()) seen = fmt::format("no report in {:.0f} s", seconds(pace_.listen));
+    if (reports.empty()) seen = fmt::format("no report in {:.1f} s", seconds(pace_.listen));
     for (const ReceivedReport& r : reports) {
       if (r.outcome != Decoding::wrong_length && r.outcome != Decoding::wrong_id) continue;
       seen += fmt::format(", {} with another length or id, such as {} bytes, id 0x{:02x}", misshapen,
@@ -355,7 +356,7 @@ class Conformance {
             std::max(kTravelByPulses.rad, kTravelPerStep * profile_.pose_report.orientation.step)};
   }
 
-  /// Judges the velocities by the motion of the pulses, where the user moved the handle too little.
+  /// Judges each velocity by the motion of the pulses if the motion of the user could not judge it.
   void judge_velocities_of_pulses() {
     const VelocityComparison seen = compare_velocities(pulse_motion_);
     const auto judge = [&](const char* rule, std::size_t first, bool present, bool pose_known) {

@@ -33,7 +33,7 @@ struct ConformanceOptions {
   Duration motion_time = std::chrono::seconds(20);
   /// If false, no command contains a wrench other than zero.
   bool pulses = true;
-  /// If true, the check takes about three seconds instead of ten: shorter series, fewer and shorter pulses.
+  /// If true, the series of commands and the pulses are shorter, and there are fewer pulses.
   bool brief = false;
 };
 

@@ -149,7 +149,23 @@ TEST_CASE(
   CHECK_FALSE(bench.needed());
 }
 
-TEST_CASE("wrenchd does not arm a device whose force is inverted, whoever asks", "[first_test][wall_time]") {
+TEST_CASE("a rule that failed once must pass in the second test, not merely escape judgement",
+          "[first_test]") {
+  // The force is inverted for the first pulses; in the second test the motors move nothing.
+  int pulses = 0;
+  Bench bench(in_motors([&pulses](wf_wrench& w) {
+    const bool on = w.force_uN[0] != 0 || w.force_uN[1] != 0 || w.force_uN[2] != 0;
+    if (on) ++pulses;
+    constexpr int kOfFirstTest = 8'000;  // periods of the motor context, 16 a millisecond
+    for (std::int32_t& f : w.force_uN) f = pulses < kOfFirstTest ? -f : 0;
+  }));
+  CHECK_THAT(bench.run(), Contains("force_direction"));
+  CHECK(pulses > 8'000);
+  CHECK(bench.needed());
+}
+
+TEST_CASE("wrenchd arms no device whose force is inverted, neither by an option nor for a client",
+          "[first_test][wall_time]") {
   const MachineLoad load;
   const TemporaryDirectory files;
   const std::string socket = (files.path() / "control.sock").string();
