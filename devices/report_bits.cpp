@@ -77,7 +77,7 @@ void put_plain(unsigned bits, std::uint64_t value, std::uint8_t* at) noexcept {
 /// Returns the raw integer of `counts`, clamped to the range of the field.
 std::uint64_t clamped(const ReportField& field, double counts) noexcept {
   const std::uint64_t all = mask_of(field.bits);
-  const double end = static_cast<double>(std::uint64_t{1} << (field.bits - 1));  // half the range
+  const double end = std::ldexp(1.0, static_cast<int>(field.bits) - 1);  // half the range
   if (!field.is_signed) {
     if (counts <= 0.0) return 0;
     return counts >= 2.0 * end ? all : static_cast<std::uint64_t>(counts);
