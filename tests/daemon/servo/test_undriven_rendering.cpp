@@ -134,6 +134,7 @@ TEST_CASE("a closed path of a hand that feels three forces gives no work, in eit
     CHECK(r.sent.net_J() - r.friction_J < 1e-6);
     CHECK(r.least_scale == 1.0);
     CHECK(r.least_share > 0.7);
+    CHECK(r.least_of_possible > 0.9);
     CHECK(std::abs(r.gradient.net_J() / kRounds) == Approx(1.8e-3).epsilon(0.05));
   }
 }
