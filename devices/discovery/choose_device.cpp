@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/discovery/choose_device.hpp"
 
+#include <algorithm>
+
 #include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
 #include "devices/profile_reports.hpp"
@@ -73,12 +75,19 @@ DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const
   }
   if (candidates.size() == 1) choice.selection = candidates.front();
   if (candidates.size() < 2) return choice;
-  for (const DeviceChoice::Selection& pick : candidates)
+  for (const DeviceChoice::Selection& pick : candidates) {
+    const UsbDevice& device = connected[pick.device];
+    const auto same_serial = std::count_if(candidates.begin(), candidates.end(), [&](const auto& other) {
+      return connected[other.device].serial == device.serial;
+    });
+    const bool by_serial = !device.serial.empty() && same_serial == 1;
     choice.rejections[pick.device] =
         "it matches the profile " + profiles[pick.profile].name + ", and other devices match too: this is " +
-        serial_text(connected[pick.device]) +
-        (connected[pick.device].port_path.empty() ? "" : " in USB port " + connected[pick.device].port_path) +
-        "; set the profile and the serial number or usb_port in [device], or unplug the others";
+        serial_text(device) + (device.port_path.empty() ? "" : " in USB port " + device.port_path) +
+        "; select it by profile = \"" + profiles[pick.profile].name + "\" and " +
+        (by_serial ? "serial = \"" + device.serial : "usb_port = \"" + device.port_path) +
+        "\" in [device], or unplug the others";
+  }
   return choice;
 }
 
