@@ -10,9 +10,11 @@ constexpr Duration kSplitPeriod = std::chrono::milliseconds(8);
 constexpr Duration kCombinedPeriod = std::chrono::milliseconds(16);
 constexpr int kZeroPackets = 3;
 
-void put(std::span<std::uint8_t> bytes, std::span<const int> counts) noexcept {
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    const auto word = static_cast<std::uint16_t>(counts[i]);
+/// Writes the low 16 bits of each number.
+template <class T>
+void put(std::span<std::uint8_t> bytes, std::span<const T> numbers) noexcept {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto word = static_cast<std::uint16_t>(numbers[i]);
     bytes[2 * i] = static_cast<std::uint8_t>(word & 0xffu);
     bytes[2 * i + 1] = static_cast<std::uint8_t>(word >> 8);
   }
@@ -37,17 +39,13 @@ void EmulatedSpaceMouse::advance_to(TimePoint t, ReportSink& host) noexcept {
 
 void EmulatedSpaceMouse::send(ReportSink& host) noexcept {
   if (sending_stopped_) return;
-  if (buttons_ != buttons_sent_) {
-    buttons_sent_ = buttons_;
-    const std::array<std::uint8_t, 3> report = {3, static_cast<std::uint8_t>(buttons_ & 0xffu),
-                                                static_cast<std::uint8_t>(buttons_ >> 8 & 0xffu)};
-    host.take_report(next_packet_at_, report);
-  }
+  send_buttons(host);
+  send_keys(host);
   const bool at_rest = std::all_of(counts_.begin(), counts_.end(), [](int c) { return c == 0; });
   if (at_rest && zeros_left_ == 0) return;
   if (at_rest) --zeros_left_;
   const std::span<const int> counts(counts_);
-  if (format_ == Format::combined) {
+  if (format_ != Format::split) {
     std::array<std::uint8_t, 13> report = {1};
     put(std::span(report).subspan(1), counts);
     host.take_report(next_packet_at_, report);
@@ -56,6 +54,22 @@ void EmulatedSpaceMouse::send(ReportSink& host) noexcept {
   std::array<std::uint8_t, 7> report = {static_cast<std::uint8_t>(rotation_next_ ? 2 : 1)};
   put(std::span(report).subspan(1), counts.subspan(rotation_next_ ? 3 : 0, 3));
   rotation_next_ = !rotation_next_;
+  host.take_report(next_packet_at_, report);
+}
+
+void EmulatedSpaceMouse::send_buttons(ReportSink& host) noexcept {
+  if (buttons_ == buttons_sent_) return;
+  buttons_sent_ = buttons_;
+  std::array<std::uint8_t, 5> report = {3};
+  for (std::size_t i = 0; i < 4; ++i) report[1 + i] = static_cast<std::uint8_t>(buttons_ >> 8 * i & 0xffu);
+  host.take_report(next_packet_at_, std::span(report).first(format_ == Format::enterprise ? 5 : 3));
+}
+
+void EmulatedSpaceMouse::send_keys(ReportSink& host) noexcept {
+  if (format_ != Format::enterprise || keys_ == keys_sent_) return;
+  keys_sent_ = keys_;
+  std::array<std::uint8_t, 13> report = {0x1c};
+  put(std::span(report).subspan(1), std::span<const std::uint16_t>(keys_));
   host.take_report(next_packet_at_, report);
 }
 

@@ -10,11 +10,13 @@ namespace wrenchd {
 
 /// Emulated 3Dconnexion SpaceMouse: a spring-loaded puck. While it is deflected it sends a packet every 8 ms,
 /// translation and rotation in turn, or both every 16 ms in the combined format. After its release it sends
-/// three packets of zeros and then nothing. It sends buttons when they change. Output report 4 sets the LED.
+/// three packets of zeros and then nothing. It sends buttons and keys when they change. Output report 4 sets
+/// the LED.
 /// All members are RT-safe except inject().
 class EmulatedSpaceMouse final : public EmulatedDevice {
  public:
-  enum class Format : std::uint8_t { split, combined };
+  /// enterprise: combined, with 31 buttons in place of 16, and numbered keys.
+  enum class Format : std::uint8_t { split, combined, enterprise };
   /// Counts at full deflection.
   static constexpr int kFullScale = 350;
 
@@ -24,6 +26,8 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
   /// axes. Clamps it to kFullScale.
   void set_deflection(const std::array<int, 6>& counts) noexcept;
   void set_buttons(std::uint32_t buttons) noexcept { buttons_ = buttons; }
+  /// Sets the numbers of the pressed keys, 0 for none. Only the format `enterprise` sends them.
+  void set_keys(const std::array<std::uint16_t, 6>& keys) noexcept { keys_ = keys; }
   /// Fault: the device sends nothing any more, not even zeros.
   void stop_sending() noexcept { sending_stopped_ = true; }
 
@@ -35,6 +39,8 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
 
  private:
   void send(ReportSink& host) noexcept;
+  void send_buttons(ReportSink& host) noexcept;
+  void send_keys(ReportSink& host) noexcept;
 
   Format format_;
   bool powered_ = false, sending_stopped_ = false;
@@ -43,6 +49,7 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
   int zeros_left_ = 0;  ///< packets of zeros that are still to be sent
   bool rotation_next_ = false;
   std::uint32_t buttons_ = 0, buttons_sent_ = 0;
+  std::array<std::uint16_t, 6> keys_{}, keys_sent_{};
   bool led_ = false;
 };
 

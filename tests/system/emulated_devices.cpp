@@ -7,10 +7,13 @@
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "config/load_profile.hpp"
+#include "devices/discovery/choose_device.hpp"
 #include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
 #include "devices/links/link_settings.hpp"
@@ -175,6 +178,13 @@ double firmness(double share) {
   return std::pow((share - 0.08) / 0.92, 2.0);
 }
 
+/// Runs ticks until the device has sent for this time.
+double run_for(Driven& host, Duration d) {
+  const TimePoint began = host.sample.arrived;
+  while (host.sample.arrived < began + d && host.fault == Fault::none) host.ticks(1);
+  return seconds(host.sample.arrived - began);
+}
+
 void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const char* profile) {
   const bool split = format_of == EmulatedSpaceMouse::Format::split;
   Row row(
@@ -200,8 +210,7 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   p.far.with([&] { mouse.set_deflection({280, 140, 70, 0, 0, -200}); });
   p.host.ticks(50);
   const DeviceSample before = p.host.sample;
-  while (p.host.sample.arrived < before.arrived + 500ms && p.host.fault == Fault::none) p.host.ticks(1);
-  const double time_s = seconds(p.host.sample.arrived - before.arrived);
+  const double time_s = run_for(p.host, 500ms);
   const Vector3d way = p.host.sample.X_BH.translation_m - before.X_BH.translation_m;
   const Vector3d turn = rotation_vector(p.host.sample.X_BH.rotation * before.X_BH.rotation.conjugate());
   const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
@@ -233,6 +242,131 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   CHECK_THAT(row, !p.far.with([&] { return mouse.led(); }));
   CHECK_THAT(row, (last == std::vector<std::uint8_t>{4, 0}));
   row.saw(format("%llu reports", static_cast<unsigned long long>(left.sequence)));
+}
+
+void enterprise_keys(Backend backend) {
+  Row row(
+      backend, "SpaceMouse Enterprise, keys",
+      "found by its profile; keys pressed at rest and in motion are no fault and no rejected report, and the "
+      "motion is the same as without; buttons up to the 31st are read");
+  EmulatedSpaceMouse mouse(EmulatedSpaceMouse::Format::enterprise);
+  UsbShape shape;
+  shape.report_descriptor = space_mouse_enterprise();
+  shape.out = 0;
+  shape.in_bytes = 32;
+  shape.product = "SpaceMouse Enterprise";
+  shape.high_speed = false;
+  Plugged p(backend, mouse, {0x256f, 0xc633, ""}, shape);
+  CHECK_THAT(row, p.host.device.profile().name == "spacemouse_combined");
+
+  std::uint32_t rejected = 0;
+  int keys_sent = 0;
+  const auto press = [&](int key) {
+    const auto number = static_cast<std::uint16_t>(key);
+    p.far.with([&] { mouse.set_keys({number}); });
+    ++keys_sent;
+    for (int i = 0; i < 20; ++i) {
+      p.host.ticks(1);
+      rejected += p.host.sample.rejected;
+    }
+  };
+  for (const int key : {7, 0, 30, 0}) press(key);
+  CHECK_THAT(row, p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, {}));
+  p.far.with([&] { mouse.set_deflection({0, 0, 0, 0, 0, 200}); });
+  p.host.ticks(50);
+  const DeviceSample before = p.host.sample;
+  for (const int key : {1, 2, 0}) press(key);
+  const double time_s = seconds(p.host.sample.arrived - before.arrived) + run_for(p.host, 200ms);
+  const Vector3d turn = rotation_vector(p.host.sample.X_BH.rotation * before.X_BH.rotation.conjugate());
+  const Vector3d expected = -time_s * 11.4 * 0.0875 * firmness(200 * 2.5e-4 / 0.0875) * Vector3d::UnitZ();
+  p.far.with([&] {
+    mouse.set_deflection({});
+    mouse.set_buttons(1u << 30);
+  });
+  p.host.ticks(60);
+  row.saw(format("%d key reports, %u rejected; turn to %s", keys_sent, rejected,
+                 (turn - expected).norm() < 1e-6 ? "1e-6 rad" : "more"));
+  CHECK_THAT(row, p.host.fault == Fault::none && rejected == 0);
+  CHECK_THAT(row, time_s > 0.2 && (turn - expected).norm() < 1e-6);
+  CHECK_THAT(row, p.host.sample.buttons == 1u << 30);
+  p.host.device.close();
+}
+
+/// Two devices that differ in nothing but their USB port.
+void two_equal_space_mice(Backend backend) {
+  Row row(
+      backend, "two equal SpaceMice",
+      "without a serial number none is selected, and both ports are named; each is selected by usb_port and "
+      "reads its own puck; one is unplugged, the other one continues; it is not taken for its twin");
+  const UsbIdentity identity{0x046d, 0xc626, ""};
+  UsbShape shape;
+  shape.report_descriptor = space_navigator();
+  shape.out = 0;
+  shape.in_bytes = 8;
+  shape.product = "SpaceNavigator";
+  shape.high_speed = false;
+  std::array mice = {EmulatedSpaceMouse(EmulatedSpaceMouse::Format::split),
+                     EmulatedSpaceMouse(EmulatedSpaceMouse::Format::split)};
+  UsbipEmulator left(mice[0], identity, shape, kPriority);
+  UsbipEmulator right(mice[1], identity, shape, kPriority);
+  left.plug(kPort);
+  await_listed(identity);
+  right.plug(kPort + 1);
+  const auto listed = [&](std::size_t n) {
+    std::vector<UsbDevice> all;
+    for (int i = 0; i < 500 && all.size() != n; ++i) {
+      std::this_thread::sleep_for(10ms);
+      all = list_usb_devices();
+      std::erase_if(all, [](const UsbDevice& d) {
+        return d.hidraw_node.empty() || !open_error(d, d.hidraw_node).empty() ||
+               !open_error(d, d.usb_node).empty();
+      });
+    }
+    std::sort(all.begin(), all.end(),
+              [](const UsbDevice& a, const UsbDevice& b) { return a.port_path < b.port_path; });
+    return all;
+  };
+  const std::vector<UsbDevice> both = listed(2);
+  CHECK_THAT(row, both.size() == 2);
+  if (both.size() != 2) return;
+
+  const DeviceChoice unclear = choose_device(both, shipped(), {});
+  CHECK_THAT(row, !unclear.selection);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string cure = "usb_port = \"" + both[i].port_path + "\"";
+    CHECK_THAT(row, unclear.rejections[i].find(cure) != std::string::npos);
+    const DeviceChoice clear = choose_device(both, shipped(), {.usb_port = both[i].port_path});
+    CHECK_THAT(row, clear.selection && clear.selection->device == i);
+  }
+
+  Driven host_left(profile_of(both[0]), make_link(backend, both[0], kPriority));
+  Driven host_right(profile_of(both[1]), make_link(backend, both[1], kPriority));
+  left.with([&] { mice[0].set_deflection({0, 0, 0, 0, 0, 200}); });
+  right.with([&] { mice[1].set_deflection({280, 0, 0, 0, 0, 0}); });
+  for (int i = 0; i < 100; ++i) {
+    host_left.ticks(1);
+    host_right.ticks(1);
+  }
+  CHECK_THAT(row, host_left.fault == Fault::none && host_right.fault == Fault::none);
+  CHECK_THAT(row, host_left.sample.X_BH.translation_m.norm() == 0.0 &&
+                      rotation_vector(host_left.sample.X_BH.rotation).norm() > 0.01);
+  CHECK_THAT(row, rotation_vector(host_right.sample.X_BH.rotation).norm() == 0.0 &&
+                      host_right.sample.X_BH.translation_m.norm() > 1e-4);
+
+  left.unplug();
+  host_left.ticks(20);
+  const std::uint64_t sequence = host_right.sample.sequence;
+  host_right.ticks(40);
+  CHECK_THAT(row, host_left.fault == Fault::device_lost);
+  CHECK_THAT(row, host_right.fault == Fault::none && host_right.sample.sequence > sequence);
+  host_left.device.close();
+  host_right.device.close();
+  const std::vector<UsbDevice> one = listed(1);
+  CHECK_THAT(row, one.size() == 1 && one[0].port_path == both[1].port_path);
+  const DeviceChoice twin =
+      choose_device(one, shipped(), {.usb_port = both[0].port_path, .previous = both[0]});
+  CHECK_THAT(row, !twin.selection);
+  row.saw(twin.rejections.empty() ? "none is left" : twin.rejections[0]);
 }
 
 // --- Falcon -----------------------------------------------------------------------------------------------
@@ -322,6 +456,8 @@ void emulated_devices(Backend backend) {
   polhem(backend);
   space_mouse(backend, EmulatedSpaceMouse::Format::split, "spacemouse_split");
   space_mouse(backend, EmulatedSpaceMouse::Format::combined, "spacemouse_combined");
+  enterprise_keys(backend);
+  two_equal_space_mice(backend);
   if (backend == Backend::libusb) falcon();
 }
 

@@ -8,14 +8,10 @@
 #include <utility>
 
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/sample_descriptors.hpp"
 
 namespace wrenchd::test {
 namespace {
-
-/// The report descriptor of devices/README.md.
-constexpr std::array<std::uint8_t, 31> kReportDescriptor{
-    0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x85, 0x01,
-    0x09, 0x02, 0x95, 0x3F, 0x81, 0x02, 0x85, 0x02, 0x09, 0x03, 0x95, 0x1F, 0x91, 0x02, 0xC0};
 
 SimulationSettings ideal() {
   SimulationSettings settings;
@@ -42,8 +38,7 @@ Wrench UsbipDevice::answer_to(std::uint64_t sequence) noexcept {
 }
 
 UsbipDevice::UsbipDevice(Identity identity, double rate_Hz, int priority)
-    : UsbipPort(std::move(identity),
-                {.report_descriptor = {kReportDescriptor.begin(), kReportDescriptor.end()}}, priority),
+    : UsbipPort(std::move(identity), {.report_descriptor = reference_descriptor()}, priority),
       period_(from_seconds(1.0 / rate_Hz)),
       profile_(reference_profile()),
       firmware_(profile_, ideal(), period_) {

@@ -81,6 +81,24 @@ TEST_CASE("an untouched SpaceMouse sends nothing, which is no fault", "[emulator
   }
 }
 
+TEST_CASE("keys and the 31st button of a SpaceMouse Enterprise are read, and are no motion", "[emulators]") {
+  Bench<Mouse> bench("spacemouse_combined", Mouse::Format::enterprise);
+  bench.open();
+  bench.steps(100);
+  for (const std::uint16_t key : {std::uint16_t{30}, std::uint16_t{0}}) {
+    bench.emulator.set_keys({key});
+    for (int i = 0; i < 50; ++i) {
+      bench.step();
+      REQUIRE(bench.sample.fault == Fault::none);
+      REQUIRE(bench.sample.rejected == 0);
+    }
+  }
+  CHECK(same_bits(bench.sample.X_BH, {}));
+  bench.emulator.set_buttons(1u << 30);
+  bench.steps(50);
+  CHECK(bench.sample.buttons == 1u << 30);
+}
+
 TEST_CASE("the deflection of the puck moves the tool, in both formats", "[emulators]") {
   // To the right, half as much toward the user, a quarter down: -y, -x / 2, -z / 4 in the base.
   const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
