@@ -109,6 +109,7 @@ class PenetrationDepth {
   std::optional<Pose> X_last_answer_;          ///< answer of the last follow(); the held planes admit it
   std::vector<SeparatingPlane> saved_planes_;  ///< held planes, saved while the search tries others
   std::vector<SeparatingPlane> best_planes_;   ///< held planes of the best answer so far
+  std::vector<double> first_energies_;         ///< T of each alternative's first answer [kg m^2]
   std::optional<Friction> friction_;           ///< empty without friction
   std::optional<Proxy> proxy_;  ///< empty in scenes without meshes, and for all methods but exact
   /// empty if the scene has no mesh obstacles, or if all bodies are convex

@@ -306,10 +306,10 @@ void SceneContacts::add_candidate(std::uint32_t k, SeparatingPlane plane, const 
         candidates_.begin(), candidates_.end(),
         [](const PlaneCandidate& x, const PlaneCandidate& y) { return x.separation_m < y.separation_m; });
     if (worst->separation_m >= at.separation_m) return;
-    *worst = {k, plane, at.separation_m};
+    *worst = {k, plane, at.separation_m, at.nearest};
     return;
   }
-  candidates_.push_back({k, plane, at.separation_m});
+  candidates_.push_back({k, plane, at.separation_m, at.nearest});
 }
 
 /// Separate spheres are separated along the line between their centres.
@@ -400,7 +400,24 @@ std::size_t SceneContacts::survey_planes(const Pose& pose) noexcept {
         candidates_.begin() + static_cast<std::ptrdiff_t>(std::min(room, candidates_.size())));
   }
   survey_best_ = planes_;
+  estimate_survey(X_WT);
   return survey_candidates_.size();
+}
+
+// For small rotations, with a the deepest vertex of the tool from its centre of mass:
+//
+//   estimate = m depth^2 / (1 + m c' H^-1 c),    c = a x n
+void SceneContacts::estimate_survey(const Frame& X_WT) noexcept {
+  const Inertia& M = scene_.tool().solid.inertia;
+  const Matrix3d H_inverse = M.H_kg_m2.inverse();
+  for (PlaneCandidate& candidate : survey_candidates_) {
+    const Vector3d n_T = X_WT.R.transpose() * candidate.plane.n_W;
+    const Vector3d c = scene_.tool().hull.vertices_T_m[candidate.nearest.tool_vertex].cross(n_T);
+    const double depth_m = candidate.separation_m;
+    candidate.estimate = M.mass_kg * depth_m * depth_m / (1.0 + M.mass_kg * c.dot(H_inverse * c));
+  }
+  std::sort(survey_candidates_.begin(), survey_candidates_.end(),
+            [](const PlaneCandidate& x, const PlaneCandidate& y) { return x.estimate < y.estimate; });
 }
 
 void SceneContacts::hold_survey_plane(std::size_t i) noexcept {

@@ -55,9 +55,13 @@ class SceneContacts final : public ContactSource {
   /// convex obstacle the plane of largest separation. Returns the number of alternatives for
   /// hold_survey_plane(). Not RT-safe: allocates nothing, but may take several milliseconds.
   std::size_t survey_planes(const Pose& X_WT) noexcept;
+  static constexpr std::size_t kMaxSurveyPlanes = 288;  ///< for all obstacles
   /// Holds the planes of the last survey, and replaces one of them by the survey's alternative i.
-  /// Alternatives are sorted by depth, the least deep first. RT-safe.
+  /// Alternatives are sorted by survey_estimate(), the least first. RT-safe.
   void hold_survey_plane(std::size_t i) noexcept;
+  /// Returns about the least T from the surveyed pose that opens the plane of alternative i [kg m^2]: the one
+  /// that moves the deepest vertex of the tool out of it by a small rotation and a translation. RT-safe.
+  double survey_estimate(std::size_t i) const noexcept { return survey_candidates_[i].estimate; }
 
   /// Fixes the held planes in the world as they are at X_WT. RT-safe.
   void fix_planes_to_world(const Pose& X_WT) noexcept;
@@ -78,15 +82,17 @@ class SceneContacts final : public ContactSource {
   bool planes_optimal(const Projection& q) noexcept;
 
  private:
-  struct PlaneCandidate {
-    std::uint32_t obstacle;  ///< index among the convex obstacles
-    SeparatingPlane plane;
-    double separation_m;
-  };
   /// A vertex of the tool and a vertex of the obstacle.
   struct VertexPair {
     std::uint32_t tool_vertex = 0;
     std::uint32_t obstacle_vertex = 0;
+  };
+  struct PlaneCandidate {
+    std::uint32_t obstacle;  ///< index among the convex obstacles
+    SeparatingPlane plane;
+    double separation_m;
+    VertexPair nearest;
+    double estimate = 0.0;  ///< see survey_estimate(); only after survey_planes() [kg m^2]
   };
   /// The centre of pressure of the contacts with one obstacle.
   struct PressureCentre {
@@ -107,8 +113,7 @@ class SceneContacts final : public ContactSource {
     bool degenerate;  ///< same meaning as PlaneNormal::degenerate
   };
 
-  static constexpr std::size_t kMaxCandidates = 96;     ///< for one obstacle
-  static constexpr std::size_t kMaxSurveyPlanes = 288;  ///< for all obstacles
+  static constexpr std::size_t kMaxCandidates = 96;  ///< for one obstacle
   /// survey_planes() compares no more; this many take some milliseconds
   static constexpr std::size_t kMaxEdgePairs = 200000;
 
@@ -138,6 +143,7 @@ class SceneContacts final : public ContactSource {
   void add_touching_candidates(std::uint32_t k, const PlaneSeparation& held, const Frame& X_WT) noexcept;
   void add_widest_gap_candidate(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_candidates() noexcept;
+  void estimate_survey(const Frame& X_WT) noexcept;
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;

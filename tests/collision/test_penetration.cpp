@@ -188,6 +188,25 @@ TEST_CASE("no admissible pose near the answer is closer", "[penetration][convex]
   CHECK(compared > 1000);
 }
 
+// Starts on all sides and with all rotations, from each of which a proxy goes down to a local optimum.
+TEST_CASE("no start on another side of the obstacle leads to a closer pose", "[penetration][convex]") {
+  RandomValues random(29);
+  for (int i = 0; i < case_count(25); ++i) {
+    const OverlappingScene c = overlap_body(random, random.uniform(0.05, 0.5));
+    PenetrationDepth depth = depth_by(Method::exact, c.scene);
+    const double least = depth.query(c.X_WP).projection.energy;
+    INFO("case " << i);
+    for (int k = 0; k < 50; ++k) {
+      const Vector3d turn = random.uniform(0.0, 1.2) * random.unit<3>();
+      Pose X_start(rotation_from(turn) * c.X_WP.rotation, c.X_WP.translation_m);
+      const Vector3d out_W = random.unit<3>();
+      while (separation_m(c.scene, X_start) < 0.0) X_start.translation_m += 0.05 * out_W;
+      depth.clear_history();
+      REQUIRE(depth.follow(c.X_WP, X_start).projection.energy >= least * (1.0 - 1e-7));
+    }
+  }
+}
+
 TEST_CASE("a proxy that slides over a convex body is admissible at every step and loses nothing",
           "[penetration][convex]") {
   RandomValues random(23);

@@ -561,16 +561,20 @@ int main(int argc, char** argv) {
                  "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  const std::map<std::string, DofMask> axes = {
-      {"6", kAllDofs}, {"5", kAllDofs & ~0b100'000}, {"3", kLinearDofs}};
-  app.add_option("--senses", options.senses, "axes that the device senses: 6, or 3 translations")
-      ->transform(CLI::CheckedTransformer(axes));
-  app.add_option("--drives", options.drives, "axes that it drives: 6, 5 (no torque about z), or 3 forces")
-      ->transform(CLI::CheckedTransformer(axes));
+  const std::map<int, DofMask> axes = {{6, kAllDofs}, {5, kAllDofs & ~0b100'000}, {3, kLinearDofs}};
+  int senses = 6, drives = 6;
+  app.add_option("--senses", senses, "axes that the device senses: 6, or 3 translations")
+      ->check(CLI::IsMember({3, 6}))
+      ->capture_default_str();
+  app.add_option("--drives", drives, "axes that it drives: 6, 5 (no torque about z), or 3 forces")
+      ->check(CLI::IsMember({3, 5, 6}))
+      ->capture_default_str();
   app.add_flag("--measured-rotation", options.measured_rotation,
                "renders undriven motion as measured, to show what the energy account prevents");
   app.add_flag("--tell", tell, "prints the parameters of each violation");
   CLI11_PARSE(app, argc, argv);
+  options.senses = axes.at(senses);
+  options.drives = axes.at(drives);
 
   const Scene floor = scene_of(false), posted = scene_of(true);
   double worst_J = 0.0;
