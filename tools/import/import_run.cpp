@@ -23,6 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMinChord_mm = 1e-6, kMaxChord_mm = 1e3;
+/// Share of the chord error that is left to the rounding of a file in single precision. It suffices if the
+/// part is smaller than about 100,000 times the chord error.
+constexpr double kRoundingShare = 0.01;
 
 void print_row(const char* label, const std::string& value) {
   std::printf("%-18s %s\n", label, value.c_str());
@@ -131,9 +134,11 @@ void print_remarks(const ImportedBody& body) {
 }
 
 void import_to_mesh(const ImportOptions& options, const ImportJob& job) {
-  ImportedFile file = import_file(job);
+  ImportJob meshing = job;
+  if (has_single_precision(options.output)) meshing.chord_mm *= 1.0 - kRoundingShare;
+  ImportedFile file = import_file(meshing);
   print_content(file, job.file.filename().string());
-  const ImportedBody body = join_parts(std::move(file), joining_of(options, job));
+  const ImportedBody body = join_parts(std::move(file), joining_of(options, meshing));
   if (options.output.empty()) {
     print_remarks(body);
     std::fputs(report_text(body, {body.chord_error_mm, 0.0}).c_str(), stdout);

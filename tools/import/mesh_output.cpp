@@ -94,8 +94,12 @@ void require_mesh_extension(const std::filesystem::path& file) {
                     "'; name a .stl, .off, .ply or .obj file, or a .toml scene");
 }
 
+bool has_single_precision(const std::filesystem::path& file) {
+  return extension_of(file) == ".stl";
+}
+
 double rounding_mm(const TriangleMesh& mesh_mm, const std::filesystem::path& file) {
-  if (extension_of(file) != ".stl") return 0.0;
+  if (!has_single_precision(file)) return 0.0;
   double largest = 0.0;
   for (const Vector3d& p : mesh_mm.vertices_m)
     largest = std::max(largest, (p - p.cast<float>().cast<double>()).norm());

@@ -11,9 +11,12 @@ namespace wrenchd {
 /// Throws ImportError if no mesh can be written to a file with this extension. Not RT-safe: allocates.
 void require_mesh_extension(const std::filesystem::path& file);
 
-/// Returns the largest distance by which a file with this extension moves a vertex of the mesh: binary STL
-/// has single precision [mm]; the other formats change nothing. Not RT-safe: linear in the number of
-/// vertices.
+/// Returns true if files with this extension hold coordinates in single precision: binary STL. Not RT-safe:
+/// allocates.
+bool has_single_precision(const std::filesystem::path& file);
+
+/// Returns the largest distance by which a file with this extension moves a vertex of the mesh [mm]; 0
+/// without single precision. Not RT-safe: linear in the number of vertices.
 double rounding_mm(const TriangleMesh& mesh_mm, const std::filesystem::path& file);
 
 /// Returns the content of a binary STL, OFF, PLY or OBJ file, by the extension. statement: one line that the

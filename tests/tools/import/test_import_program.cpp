@@ -148,6 +148,25 @@ TEST_CASE("each remedy for solids that overlap works") {
   CHECK(run_program("wrenchctl", {"check", scene}).exit_code == 0);
 }
 
+// Single precision moves the vertices of this ball by up to 2 um. The first run measures the error of the
+// mesh that the second run, which may have no more, tries first.
+TEST_CASE("meshing leaves room for single precision") {
+  const TemporaryDirectory dir;
+  const TopoDS_Shape ball = BRepPrimAPI_MakeSphere(50.0).Shape().Moved(at(5e4, 0, 0));
+  const std::string step = dir.write("a.step", step_of(ball)).string();
+  const auto import_to = [&](const char* name, const std::string& chord) {
+    return run_program("wrenchd-import", {step, "-o", (dir.path() / name).string(), "--chord", chord});
+  };
+  const ProgramResult loose = import_to("out.ply", "0.55mm");
+  INFO(loose.err << loose.out);
+  REQUIRE(loose.exit_code == 0);
+  const std::size_t at_most = loose.out.find("at most ") + 8;
+  const std::string measured = loose.out.substr(at_most, loose.out.find(" mm", at_most) - at_most) + "mm";
+  const ProgramResult tight = import_to("out.stl", measured);
+  INFO(measured << ' ' << tight.err << tight.out);
+  CHECK(tight.exit_code == 0);
+}
+
 TEST_CASE("a chord error that single precision does not keep is rejected") {
   const TemporaryDirectory dir;
   const TopoDS_Shape far = BRepPrimAPI_MakeSphere(5.0).Shape().Moved(at(1e6, 0, 0));
