@@ -5,6 +5,7 @@
 #include <chrono>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "collision/clearance.hpp"
 #include "collision/contact_detection.hpp"
@@ -54,22 +55,27 @@ SolvedPose PoseSolver::project(const Pose& X_WM, double scene_time_s) {
 }
 
 std::vector<SolvedPose> PoseSolver::follow(std::span<const Pose> X_WM, double rate_Hz) {
+  std::vector<SolvedPose> rows;
+  rows.reserve(X_WM.size());
+  follow(X_WM, rate_Hz, [&](const Pose&, SolvedPose solved) { rows.push_back(std::move(solved)); });
+  return rows;
+}
+
+void PoseSolver::follow(std::span<const Pose> X_WM, double rate_Hz,
+                        const std::function<void(const Pose&, SolvedPose)>& take) {
   PenetrationDepth::Options options = settings_.depth;
   options.clearance_m = Proxy::kClearance_m;
   PenetrationDepth depth(scene_, options);
   std::optional<Pose> X_last;  // previous pose of the proxy
-  std::vector<SolvedPose> rows;
-  rows.reserve(X_WM.size());
-  for (const Pose& X_WM_p : X_WM) {
-    const Pose X_WP = X_WM_p * scene_.tool().X_MT();
-    const double scene_time_s = static_cast<double>(rows.size()) / rate_Hz;
+  for (std::size_t i = 0; i < X_WM.size(); ++i) {
+    const Pose X_WP = X_WM[i] * scene_.tool().X_MT();
+    const double scene_time_s = static_cast<double>(i) / rate_Hz;
     const auto [penetration, solve_ns] = timed([&] {
       return X_last ? depth.follow(X_WP, *X_last, scene_time_s) : depth.query(X_WP, {}, scene_time_s);
     });
     if (penetration.projection.status != ProjectionStatus::infeasible) X_last = penetration.projection.X_WQ;
-    rows.push_back(answer(X_WM_p, penetration, solve_ns));
+    take(X_WM[i], answer(X_WM[i], penetration, solve_ns));
   }
-  return rows;
 }
 
 bool PoseSolver::overlaps(const Pose& X_WM, double scene_time_s) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -50,6 +51,10 @@ class PoseSolver {
   /// never enters or crosses an obstacle. The first pose is solved without history. Pose i has scene time
   /// i / rate_Hz.
   std::vector<SolvedPose> follow(std::span<const Pose> X_WM, double rate_Hz = 1000.0);
+  /// The same, but calls take(pose, answer) for each pose in turn. A stored answer has room for all contacts,
+  /// some ten kilobytes.
+  void follow(std::span<const Pose> X_WM, double rate_Hz,
+              const std::function<void(const Pose&, SolvedPose)>& take);
 
   /// Returns true if the tool at this pose and an obstacle have a common point, or if one contains the other.
   /// Bodies that touch overlap.

@@ -162,6 +162,11 @@ class Answers(unittest.TestCase):
         copy = pickle.loads(pickle.dumps(self.scene))
         table = random_poses(20, 0.05, 3)
         np.testing.assert_array_equal(copy.project(table).energy, self.scene.project(table).energy)
+        answers = self.scene.project(table)
+        kept = pickle.loads(pickle.dumps(answers))
+        self.assertEqual([len(a.contacts) for a in kept], [len(a.contacts) for a in answers])
+        np.testing.assert_array_equal(kept[3].contacts[0].point, answers[3].contacts[0].point)
+        self.assertEqual(len(kept[-1].contacts), len(answers[19].contacts))
         mesh = pickle.loads(pickle.dumps(box(0.01, "named", 2.0)))
         self.assertEqual((mesh.name, mesh.scale, len(mesh.faces)), ("named", 2.0, 6))
 

@@ -141,11 +141,58 @@ Value choice(const std::map<std::string, Value>& choices, const std::string& opt
   throw std::invalid_argument(option + ": one of " + names + "; not \"" + value + "\"");
 }
 
-/// What a trajectory or a table of poses gave: one row for each pose.
+/// What one pose gave, without the room that a SolvedPose has for contacts.
+struct Row {
+  Pose X_WM;
+  Vector6d eps, gradient;
+  Wrench F_T, F_S;
+  double energy, kkt_residual, solve_ns;
+  std::uint16_t contacts, iterations;
+  bool proven_global;
+  ProjectionStatus status;
+};
+
+/// The contacts of a table of poses. Python objects are made only for the rows that a program reads.
+class ContactRows {
+ public:
+  explicit ContactRows(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)) {}
+
+  void add(const Touches& touches) {
+    all_.insert(all_.end(), touches.begin(), touches.end());
+    ends_.push_back(all_.size());
+  }
+  std::size_t size() const { return ends_.size(); }
+  /// One tuple a contact: point, normal, multiplier, load fraction, obstacle, tool feature, obstacle feature.
+  py::list row(py::ssize_t i) const {
+    const auto n = static_cast<py::ssize_t>(ends_.size());
+    if (i < -n || i >= n) throw py::index_error("no pose " + std::to_string(i) + " of " + std::to_string(n));
+    const auto at = static_cast<std::size_t>(i < 0 ? i + n : i);
+    py::list out;
+    for (std::size_t k = at == 0 ? 0 : ends_[at - 1]; k < ends_[at]; ++k) {
+      const Touch& touch = all_[k];
+      const auto feature = [](std::uint8_t kind, std::uint32_t first, std::uint32_t second) {
+        return text(Feature{static_cast<FeatureKind>(kind), first, second});
+      };
+      out.append(py::make_tuple(
+          py::array_t<double>(3, touch.point_W_m.data()), py::array_t<double>(3, touch.normal_W.data()),
+          touch.multiplier_kg_m, touch.load_fraction, obstacle_name(*scene_, touch.obstacle),
+          feature(touch.tool_feature_kind, touch.tool_first, touch.tool_second),
+          feature(touch.obstacle_feature_kind, touch.obstacle_first, touch.obstacle_second)));
+    }
+    return out;
+  }
+
+ private:
+  std::shared_ptr<const Scene> scene_;
+  std::vector<Touch> all_;
+  std::vector<std::size_t> ends_;  ///< end of each pose's contacts in all_
+};
+
+/// What a trajectory or a table of poses gave.
 struct Rows {
-  std::vector<SolvedPose> solved;
-  std::vector<Touches> touches;
-  std::vector<Vector6d> gradient;
+  explicit Rows(std::shared_ptr<const Scene> scene) : contacts(std::move(scene)) {}
+  std::vector<Row> rows;
+  ContactRows contacts;
 };
 
 /// The scene with its solver. Several Python threads may share it: a mutex keeps their calls apart, and the
@@ -180,30 +227,29 @@ class Engine {
     solve_.k_P = options["k_p"].cast<double>();
     solve_.energy_stiffness_per_s2 = options["energy_stiffness"].cast<double>();
     const py::gil_scoped_release release;
-    scene_ = std::make_unique<Scene>(settings, loader_);
+    scene_ = std::make_shared<const Scene>(settings, loader_);
     solver_ = std::make_unique<PoseSolver>(*scene_, solve_);
   }
 
   py::object project(const Array& poses, double time_s) {
     const std::vector<Pose> X_WM = poses_from(poses);
-    Rows rows;
+    Rows rows(scene_);
     {
       const py::gil_scoped_release release;
       const std::lock_guard lock(mutex_);
       for (const Pose& X : X_WM) add(rows, X, solver_->project(X, time_s));
     }
-    return columns_of(rows);
+    return columns_of(std::move(rows));
   }
   py::object follow(const Array& poses, double rate_Hz) {
     const std::vector<Pose> X_WM = poses_from(poses);
-    Rows rows;
+    Rows rows(scene_);
     {
       const py::gil_scoped_release release;
       const std::lock_guard lock(mutex_);
-      std::vector<SolvedPose> solved = solver_->follow(X_WM, rate_Hz);
-      for (std::size_t i = 0; i < solved.size(); ++i) add(rows, X_WM[i], std::move(solved[i]));
+      solver_->follow(X_WM, rate_Hz, [&](const Pose& X, const SolvedPose& solved) { add(rows, X, solved); });
     }
-    return columns_of(rows);
+    return columns_of(std::move(rows));
   }
   py::array overlaps(const Array& poses, double time_s) {
     return each<bool>(poses, [&](const Pose& X) { return solver_->overlaps(X, time_s); });
@@ -288,7 +334,7 @@ class Engine {
     return out;
   }
 
-  void add(Rows& rows, const Pose& X_WM, SolvedPose solved) const {
+  void add(Rows& rows, const Pose& X_WM, const SolvedPose& solved) const {
     const Projection& projection = solved.penetration.projection;
     const ToolBody& tool = scene_->tool();
     Vector6d gradient = Vector6d::Zero();
@@ -297,61 +343,46 @@ class Engine {
       const Wrench F = energy_wrench(tool.solid.inertia, 2.0, X_WM * tool.X_MT(), projection.X_WQ);
       gradient << -F.force_N, -F.torque_Nm;
     }
-    rows.gradient.push_back(gradient);
-    rows.touches.push_back(wrenchd::touches(projection, *scene_, features_of_meshes()));
-    rows.solved.push_back(std::move(solved));
+    rows.rows.push_back({solved.X_WM, solved.penetration.eps, gradient, solved.F_T, solved.F_S,
+                         projection.energy, projection.kkt_residual, solved.solve_ns,
+                         solved.penetration.contacts, projection.iterations, projection.proven_global,
+                         projection.status});
+    rows.contacts.add(touches(projection, *scene_, solver_->uses_mesh_features()));
   }
-  bool features_of_meshes() const { return solver_->uses_mesh_features(); }
 
-  py::object columns_of(const Rows& rows) const {
-    const auto n = static_cast<py::ssize_t>(rows.solved.size());
+  static py::object columns_of(Rows table) {
+    const auto n = static_cast<py::ssize_t>(table.rows.size());
     Array pose({n, py::ssize_t{7}}), eps({n, py::ssize_t{6}}), wrench({n, py::ssize_t{6}}),
         spatial({n, py::ssize_t{6}}), gradient({n, py::ssize_t{6}}), energy(n), residual(n), solve_ns(n);
     py::array_t<std::int64_t> contacts(n), iterations(n);
     py::array_t<bool> proven(n);
-    py::list status, touches;
+    py::list status(n);
+    std::map<ProjectionStatus, py::str> names;
     for (py::ssize_t i = 0; i < n; ++i) {
-      const SolvedPose& row = rows.solved[static_cast<std::size_t>(i)];
-      const Projection& projection = row.penetration.projection;
+      const Row& row = table.rows[static_cast<std::size_t>(i)];
       const PoseNumbers x = numbers_of(row.X_WM);
       std::copy(x.begin(), x.end(), pose.mutable_data(i, 0));
       const auto put = [i](Array& to, const Vector3d& first, const Vector3d& second) {
         for (int k = 0; k < 3; ++k) *to.mutable_data(i, k) = first[k], *to.mutable_data(i, k + 3) = second[k];
       };
-      put(eps, row.penetration.eps.head<3>(), row.penetration.eps.tail<3>());
+      put(eps, row.eps.head<3>(), row.eps.tail<3>());
       put(wrench, row.F_T.force_N, row.F_T.torque_Nm);
       put(spatial, row.F_S.force_N, row.F_S.torque_Nm);
-      const Vector6d& g = rows.gradient[static_cast<std::size_t>(i)];
-      put(gradient, g.head<3>(), g.tail<3>());
-      *energy.mutable_data(i) = projection.energy;
-      *residual.mutable_data(i) = projection.kkt_residual;
+      put(gradient, row.gradient.head<3>(), row.gradient.tail<3>());
+      *energy.mutable_data(i) = row.energy;
+      *residual.mutable_data(i) = row.kkt_residual;
       *solve_ns.mutable_data(i) = row.solve_ns;
-      *contacts.mutable_data(i) = row.penetration.contacts;
-      *iterations.mutable_data(i) = projection.iterations;
-      *proven.mutable_data(i) = projection.proven_global;
-      status.append(status_name(projection.status));
-      touches.append(contacts_of(rows.touches[static_cast<std::size_t>(i)]));
+      *contacts.mutable_data(i) = row.contacts;
+      *iterations.mutable_data(i) = row.iterations;
+      *proven.mutable_data(i) = row.proven_global;
+      status[static_cast<std::size_t>(i)] =
+          names.try_emplace(row.status, status_name(row.status)).first->second;
     }
     py::dict out;
     out["pose"] = pose, out["energy"] = energy, out["eps"] = eps, out["wrench"] = wrench;
     out["spatial_wrench"] = spatial, out["gradient"] = gradient, out["kkt_residual"] = residual;
     out["solve_ns"] = solve_ns, out["contact_count"] = contacts, out["iterations"] = iterations;
-    out["proven_global"] = proven, out["status"] = status, out["contacts"] = touches;
-    return out;
-  }
-  /// One tuple a contact: point, normal, multiplier, load fraction, obstacle, tool feature, obstacle feature.
-  py::list contacts_of(const Touches& touches) const {
-    py::list out;
-    for (const Touch& touch : touches) {
-      const auto feature = [](std::uint8_t kind, std::uint32_t first, std::uint32_t second) {
-        return text(Feature{static_cast<FeatureKind>(kind), first, second});
-      };
-      out.append(py::make_tuple(
-          py::array_t<double>(3, touch.point_W_m.data()), py::array_t<double>(3, touch.normal_W.data()),
-          touch.multiplier_kg_m, touch.load_fraction, obstacle_name(*scene_, touch.obstacle),
-          feature(touch.tool_feature_kind, touch.tool_first, touch.tool_second),
-          feature(touch.obstacle_feature_kind, touch.obstacle_first, touch.obstacle_second)));
-    }
+    out["proven_global"] = proven, out["status"] = status, out["contacts"] = std::move(table.contacts);
     return out;
   }
 
@@ -359,7 +390,7 @@ class Engine {
   std::map<std::uint64_t, std::string> names_;  ///< name of each mesh that was added
   std::set<std::string> used_;
   SolveSettings solve_;
-  std::unique_ptr<Scene> scene_;
+  std::shared_ptr<const Scene> scene_;
   std::unique_ptr<PoseSolver> solver_;
   std::mutex mutex_;
 };
@@ -373,6 +404,9 @@ PYBIND11_MODULE(_engine, module) {
   py::register_exception<MeshError>(module, "MeshError", PyExc_ValueError);
   module.def("read_mesh", &read_mesh);
   module.def("check_mesh", &check_mesh);
+  py::class_<ContactRows>(module, "ContactRows")
+      .def("__len__", &ContactRows::size)
+      .def("__getitem__", &ContactRows::row);
   py::class_<Engine>(module, "Engine")
       .def(py::init<const py::dict&, const py::list&, const py::list&, const py::dict&>())
       .def("project", &Engine::project)

@@ -338,6 +338,9 @@ class Projections:
     def contacts(self, i: int) -> List[Contact]:
         return [Contact(*one) for one in self._contacts[i]]
 
+    def __getstate__(self) -> dict:
+        return {**self.__dict__, "_contacts": [self._contacts[i] for i in range(len(self))]}
+
     def __len__(self) -> int:
         return len(self.energy)
 
