@@ -276,7 +276,8 @@ void enterprise_keys(Backend backend) {
   p.host.ticks(50);
   const DeviceSample before = p.host.sample;
   for (const int key : {1, 2, 0}) press(key);
-  const double time_s = seconds(p.host.sample.arrived - before.arrived) + run_for(p.host, 200ms);
+  run_for(p.host, 200ms);
+  const double time_s = seconds(p.host.sample.arrived - before.arrived);
   const Vector3d turn = rotation_vector(p.host.sample.X_BH.rotation * before.X_BH.rotation.conjugate());
   const Vector3d expected = -time_s * 11.4 * 0.0875 * firmness(200 * 2.5e-4 / 0.0875) * Vector3d::UnitZ();
   p.far.with([&] {

@@ -16,7 +16,7 @@
 namespace wrenchd::test {
 
 /// A device as in devices/README.md with the simulated firmware, connected to this machine by Linux's own
-/// gadget driver (usb_f_hid) and its virtual host controller (dummy_hcd). Other than the controller of
+/// gadget driver (usb_f_hid) and its virtual host controller (dummy_hcd). Unlike the controller of
 /// UsbipPort, this one can be suspended with a device connected, so the machine can sleep.
 ///
 /// The controller transfers once a jiffy (4 ms), and the device sends a report as often.
@@ -34,8 +34,6 @@ class GadgetDevice {
 
   /// Observations of the device.
   struct Record {
-    std::uint64_t sent = 0;         ///< pose reports
-    std::uint64_t out_reports = 0;  ///< written reports, valid or not
     bool motors_on = false;
     WrenchReport last;  ///< last valid command
   };
