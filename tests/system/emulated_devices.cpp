@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "config/load_profile.hpp"
+#include "daemon/wall_clock.hpp"
+#include "devices/conformance/conformance.hpp"
 #include "devices/discovery/choose_device.hpp"
 #include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
@@ -22,6 +24,8 @@
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
+#include "devices/simulation/reference_profile.hpp"
+#include "tests/support/firmware_in_hand.hpp"
 #include "tests/support/polhem_pose.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/system/usbip_emulator.hpp"
@@ -451,6 +455,57 @@ void falcon() {
   p.device.close();
 }
 
+// --- devices/firmware -------------------------------------------------------------------------------------
+
+/// Checks the rules of the open report layout as the daemon does before the first arming.
+std::vector<RuleResult> check_rules(Backend backend, FirmwareInHand& device) {
+  UsbShape shape;
+  shape.report_descriptor = reference_descriptor();
+  const UsbIdentity identity;
+  UsbipEmulator far(device, identity, shape, kPriority);
+  far.plug(kPort);
+  const UsbDevice listed = await_listed(identity);
+  const DeviceProfile profile = reference_profile();
+  const auto link = make_link(backend, listed, kPriority, link_settings(profile, 20ms));
+  WallClock clock;
+  set_own_priority(kPriority);
+  const ConformanceUser nobody = {[](const std::string&) {}, [] { return false; }};
+  const std::vector<RuleResult> results =
+      check_conformance(profile, *link, &listed, clock, nobody, {.motion_time = 0s, .brief = true});
+  set_own_priority(0);
+  return results;
+}
+
+void firmware_reference(Backend backend) {
+  Row row(backend, "firmware of devices/firmware",
+          "no rule of the open report layout is broken; with an inverted force force_direction is");
+  SimulationSettings hand;
+  hand.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0.1, 0.0, 0.2}}};
+  hand.hand_repeats = false;
+  const auto broken = [](const std::vector<RuleResult>& results) {
+    std::string rules;
+    for (const RuleResult& r : results)
+      if (r.judgement == Judgement::fail) rules += (rules.empty() ? "" : ", ") + r.rule + ": " + r.seen;
+    return rules;
+  };
+  FirmwareInHand good(reference_profile(), hand);
+  const std::vector<RuleResult> results = check_rules(backend, good);
+  const auto passed = std::count_if(results.begin(), results.end(),
+                                    [](const RuleResult& r) { return r.judgement == Judgement::pass; });
+  FirmwareMistakes inverted;
+  inverted.wrench = [](wf_wrench& F) {
+    for (auto& x : F.force_uN) x = -x;
+  };
+  FirmwareInHand bad(reference_profile(), hand, inverted);
+  const std::string bad_rules = broken(check_rules(backend, bad));
+  row.saw(format("%d rules pass; inverted: %s", static_cast<int>(passed), bad_rules.c_str()));
+  if (!broken(results).empty()) row.saw(broken(results));
+  CHECK_THAT(row, broken(results).empty());
+  CHECK_THAT(row, passed >= 20);
+  CHECK_THAT(row, bad_rules.find("force_direction: x") != std::string::npos);
+  CHECK_THAT(row, good.max_force_N() > 0.0 && good.max_force_N() <= kMaxPulse_N + 1e-6);
+}
+
 }  // namespace
 
 void emulated_devices(Backend backend) {
@@ -460,6 +515,7 @@ void emulated_devices(Backend backend) {
   enterprise_keys(backend);
   two_equal_space_mice(backend);
   if (backend == Backend::libusb) falcon();
+  firmware_reference(backend);
 }
 
 }  // namespace wrenchd::test
