@@ -96,6 +96,15 @@ class Sweeps(unittest.TestCase):
     def test_dask_gives_the_bytes_of_the_serial_sweep(self):
         self.assertEqual(self.sweep_bytes("dask.csv", "dask"), self.expected)
 
+    def test_dask_rejects_a_program_that_its_workers_would_repeat(self):
+        program = WORK / "unguarded.py"
+        program.write_text("import points, wrenchd\n"
+                           f"wrenchd.sweep(points.digest, {GRID!r}, {str(WORK / 'unguarded.csv')!r}, engine='dask')\n")
+        ended = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=60)
+        self.assertNotEqual(ended.returncode, 0)
+        self.assertIn('put its call under if __name__ == "__main__":', ended.stderr)
+        self.assertFalse((WORK / "unguarded.csv").exists())
+
     def test_kills_at_random_instants(self):
         for engine, kills in (("2", 6), ("dask", 2)):
             with self.subTest(engine=engine, seed=SEED):

@@ -23,6 +23,7 @@ import io
 import itertools
 import json
 import math
+import multiprocessing
 import os
 import re
 import shutil
@@ -202,6 +203,24 @@ def _run_processes(function, points, todo, finished, count):
             pool.shutdown(wait=False, cancel_futures=True)
 
 
+_NEEDS_GUARD = ('the workers of engine "dask" import the program that calls sweep(); put its call under '
+                'if __name__ == "__main__":')
+
+
+def _nothing():
+    pass
+
+
+def _require_guard():
+    """Raises SweepError if a process that imports the main program begins the sweep again. Dask would start such workers
+    without end."""
+    trial = multiprocessing.get_context("spawn").Process(target=_nothing)
+    trial.start()
+    trial.join()
+    if trial.exitcode != 0:
+        raise SweepError(_NEEDS_GUARD)
+
+
 def _run_dask(function, points, todo, finished, address, count):
     try:
         import distributed
@@ -209,6 +228,7 @@ def _run_dask(function, points, todo, finished, address, count):
         raise ImportError(f"a sweep on Dask needs distributed ({error}); install Debian's python3-distributed") from error
     with contextlib.ExitStack() as stack:
         if address is None:
+            _require_guard()
             cluster = distributed.LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None,
                                                silence_logs=50)
             address = stack.enter_context(cluster)
@@ -308,8 +328,8 @@ def sweep(function, grid, out, engine="serial", part=None, progress=None, worker
     (a function of a module, or DaemonRun), and must return the same for the same point; a seed is a name of the grid like
     any other. An exception becomes the column `error` of its row.
     grid: dict of lists, or list of dicts (grid_points()).
-    engine: "serial", a number of processes, "dask" (a cluster of `workers` processes on this machine), or the address of
-    a Dask scheduler.
+    engine: "serial", a number of processes, "dask" (a cluster of `workers` processes on this machine; a program then calls
+    sweep() under if __name__ == "__main__":), or the address of a Dask scheduler.
     part: (k, n) runs only every n-th run, from run k on, with a journal of its own, and returns None; a call without
     `part` afterwards reads all journals, runs what is missing, and writes the table.
     progress: shows a bar on standard error; default: if that is a terminal.
@@ -317,6 +337,9 @@ def sweep(function, grid, out, engine="serial", part=None, progress=None, worker
     Raises SweepError. If the call is interrupted, or the process is killed, the same call continues from its journal. The
     journals are removed when the table is written.
     """
+    # A worker that Dask starts imports the main program; it must not begin a sweep of its own.
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SweepError(_NEEDS_GUARD)
     points = grid_points(grid)
     out = Path(out)
     identity = _identity(function, points)
