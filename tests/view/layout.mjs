@@ -4,6 +4,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
+import { busyText } from "../support/machine_load.mjs";
 import { sleep, test } from "./browser.mjs";
 import { MOMENTS_s, shown } from "./gallery_scene.mjs";
 
@@ -54,13 +55,13 @@ function arrowsOutside() {
   return { missing, outside: arrows.filter(([, to]) => !inside(to)).map(([, to]) => to.join()) };
 }
 
-/** Returns the defects that `look` finds. The plots, the scale and the arrows follow a change of the size within a second, on a busy
- * machine later: what is found is looked at again. */
-async function remaining(look) {
+/** Returns what `find` finds after the plots, the scale and the arrows have followed a new size. A machine that is too busy to draw in
+ * time gets seven times as long. */
+async function afterDrawing(find) {
   for (let i = 0; ; ++i) {
     await sleep(1200);
-    const seen = await look();
-    if (seen.length === 0 || i === 6) return seen;
+    const found = await find();
+    if (found.length === 0 || i === 6 || await busyText() === null) return found;
   }
 }
 
@@ -73,7 +74,7 @@ test(async () => {
       await page.setViewportSize({ width, height });
       for (const colorScheme of ["light", "dark"]) {
         await page.emulateMedia({ colorScheme });
-        const seen = await remaining(async () => {
+        const defective = await afterDrawing(async () => {
           const violations = await page.evaluate(async () => (await axe.run()).violations.map(({ id, help, nodes }) =>
             `${id}: ${help}: ${nodes.map(({ target }) => target.join(" ")).join("; ")}`));
           const layout = await page.evaluate(defects, { groups: GROUPS, scrolled: SCROLLED });
@@ -81,13 +82,13 @@ test(async () => {
           if (missing) layout.push("no arrow is in the picture");
           return [...layout, ...violations, ...outside.map((at) => `an arrow ends outside of the picture, at ${at}`)];
         });
-        found.push(...seen.map((text) => `${name}, ${width} x ${height}, ${colorScheme}: ${text}`));
+        found.push(...defective.map((text) => `${name}, ${width} x ${height}, ${colorScheme}: ${text}`));
       }
     }
     // Close to the tool the arrows are longer than the picture.
     await page.mouse.move(...await page.evaluate(() => window.view.toolOnScreen()));
     for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -400);
-    const outside = await remaining(async () => (await page.evaluate(arrowsOutside)).outside);
+    const outside = await afterDrawing(async () => (await page.evaluate(arrowsOutside)).outside);
     found.push(...outside.map((at) => `${name}, close: an arrow ends at ${at}`));
     assert.deepEqual(page.complaints(), []);
     await page.close();
