@@ -138,6 +138,10 @@ TEST_CASE("two equal devices without serial numbers are distinguished by their U
   const DeviceChoice either = choose({left, right}, {.profile = "reference_full_speed"});
   CHECK_FALSE(either.selection);
   CHECK_THAT(either.rejections[1], Contains("in USB port 3-1.4") && Contains("usb_port = \"3-1.4\""));
+  UsbDevice unknown = left;
+  unknown.port_path.clear();
+  const std::string cure = choose({unknown, right}, {.profile = "reference_full_speed"}).rejections[0];
+  CHECK_THAT(cure, Contains("unplug the others") && !Contains("usb_port"));
   const DeviceChoice second = choose({left, right}, {.profile = "reference_full_speed", .usb_port = "3-1.4"});
   REQUIRE(second.selection);
   CHECK(second.selection->device == 1);
