@@ -23,8 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMinChord_mm = 1e-6, kMaxChord_mm = 1e3;
-/// Share of the chord error that is left to the rounding of a file in single precision. It suffices if the
-/// part is smaller than about 100,000 times the chord error.
+/// Share of the chord error that is left to the rounding of a file in single precision. It suffices if
+/// no coordinate exceeds about 100,000 times the chord error.
 constexpr double kRoundingShare = 0.01;
 
 void print_row(const char* label, const std::string& value) {

@@ -337,8 +337,8 @@ def sweep(function, grid, out, engine="serial", part=None, progress=None, worker
     Raises SweepError. If the call is interrupted, or the process is killed, the same call continues from its journal. The
     journals are removed when the table is written.
     """
-    # A worker that Dask starts imports the main program; it must not begin a sweep of its own.
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
+    # True in a process that is about to import the main program: a worker of Dask must not begin a sweep of its own.
+    if engine == "dask" and getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SweepError(_NEEDS_GUARD)
     points = grid_points(grid)
     out = Path(out)
