@@ -13,8 +13,6 @@
 #include <vector>
 
 #include "config/load_profile.hpp"
-#include "daemon/wall_clock.hpp"
-#include "devices/conformance/conformance.hpp"
 #include "devices/discovery/choose_device.hpp"
 #include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
@@ -24,8 +22,6 @@
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
-#include "devices/simulation/reference_profile.hpp"
-#include "tests/support/firmware_in_hand.hpp"
 #include "tests/support/polhem_pose.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/system/usbip_emulator.hpp"
@@ -189,6 +185,18 @@ double run_for(Driven& host, Duration d) {
   return seconds(host.sample.arrived - began);
 }
 
+/// The interface of a SpaceMouse: full speed, without an OUT endpoint.
+UsbShape space_mouse_shape(std::vector<std::uint8_t> report_descriptor, std::string product,
+                           std::uint8_t in_bytes) {
+  UsbShape shape;
+  shape.report_descriptor = std::move(report_descriptor);
+  shape.out = 0;
+  shape.in_bytes = in_bytes;
+  shape.product = std::move(product);
+  shape.high_speed = false;
+  return shape;
+}
+
 void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const char* profile) {
   const bool split = format_of == EmulatedSpaceMouse::Format::split;
   Row row(
@@ -197,12 +205,8 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
       "times time to 1e-6; released it stops; a button returns it to its start; the LED goes off at "
       "release, by SET_REPORT");
   EmulatedSpaceMouse mouse(format_of);
-  UsbShape shape;
-  shape.report_descriptor = split ? space_navigator() : space_mouse_wireless();
-  shape.out = 0;
-  shape.in_bytes = split ? 8 : 32;
-  shape.product = split ? "SpaceNavigator" : "SpaceMouse Wireless";
-  shape.high_speed = false;
+  const UsbShape shape = split ? space_mouse_shape(space_navigator(), "SpaceNavigator", 8)
+                               : space_mouse_shape(space_mouse_wireless(), "SpaceMouse Wireless", 32);
   const UsbIdentity identity = split ? UsbIdentity{0x046d, 0xc626, ""} : UsbIdentity{0x256f, 0xc62e, ""};
   Plugged p(backend, mouse, identity, shape);
   CHECK_THAT(row, p.host.device.profile().name == profile);
@@ -254,13 +258,8 @@ void enterprise_keys(Backend backend) {
       "found by its profile; keys pressed at rest and in motion are no fault and no rejected report, and the "
       "motion is the same as without; buttons up to the 31st are read");
   EmulatedSpaceMouse mouse(EmulatedSpaceMouse::Format::enterprise);
-  UsbShape shape;
-  shape.report_descriptor = space_mouse_enterprise();
-  shape.out = 0;
-  shape.in_bytes = 32;
-  shape.product = "SpaceMouse Enterprise";
-  shape.high_speed = false;
-  Plugged p(backend, mouse, {0x256f, 0xc633, ""}, shape);
+  Plugged p(backend, mouse, {0x256f, 0xc633, ""},
+            space_mouse_shape(space_mouse_enterprise(), "SpaceMouse Enterprise", 32));
   CHECK_THAT(row, p.host.device.profile().name == "spacemouse_combined");
 
   std::uint32_t rejected = 0;
@@ -304,12 +303,7 @@ void two_equal_space_mice(Backend backend) {
       "without a serial number none is selected, and both ports are named; each is selected by usb_port and "
       "reads its own puck; one is unplugged, the other one continues; it is not taken for its twin");
   const UsbIdentity identity{0x046d, 0xc626, ""};
-  UsbShape shape;
-  shape.report_descriptor = space_navigator();
-  shape.out = 0;
-  shape.in_bytes = 8;
-  shape.product = "SpaceNavigator";
-  shape.high_speed = false;
+  const UsbShape shape = space_mouse_shape(space_navigator(), "SpaceNavigator", 8);
   std::array mice = {EmulatedSpaceMouse(EmulatedSpaceMouse::Format::split),
                      EmulatedSpaceMouse(EmulatedSpaceMouse::Format::split)};
   UsbipEmulator left(mice[0], identity, shape, kPriority);
@@ -455,57 +449,6 @@ void falcon() {
   p.device.close();
 }
 
-// --- devices/firmware -------------------------------------------------------------------------------------
-
-/// Checks the rules of the open report layout as the daemon does before the first arming.
-std::vector<RuleResult> check_rules(Backend backend, FirmwareInHand& device) {
-  UsbShape shape;
-  shape.report_descriptor = reference_descriptor();
-  const UsbIdentity identity;
-  UsbipEmulator far(device, identity, shape, kPriority);
-  far.plug(kPort);
-  const UsbDevice listed = await_listed(identity);
-  const DeviceProfile profile = reference_profile();
-  const auto link = make_link(backend, listed, kPriority, link_settings(profile, 20ms));
-  WallClock clock;
-  set_own_priority(kPriority);
-  const ConformanceUser nobody = {[](const std::string&) {}, [] { return false; }};
-  const std::vector<RuleResult> results =
-      check_conformance(profile, *link, &listed, clock, nobody, {.motion_time = 0s, .brief = true});
-  set_own_priority(0);
-  return results;
-}
-
-void firmware_reference(Backend backend) {
-  Row row(backend, "firmware of devices/firmware",
-          "no rule of the open report layout is broken; with an inverted force force_direction is");
-  SimulationSettings hand;
-  hand.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0.1, 0.0, 0.2}}};
-  hand.hand_repeats = false;
-  const auto broken = [](const std::vector<RuleResult>& results) {
-    std::string rules;
-    for (const RuleResult& r : results)
-      if (r.judgement == Judgement::fail) rules += (rules.empty() ? "" : ", ") + r.rule + ": " + r.seen;
-    return rules;
-  };
-  FirmwareInHand good(reference_profile(), hand);
-  const std::vector<RuleResult> results = check_rules(backend, good);
-  const auto passed = std::count_if(results.begin(), results.end(),
-                                    [](const RuleResult& r) { return r.judgement == Judgement::pass; });
-  FirmwareMistakes inverted;
-  inverted.wrench = [](wf_wrench& F) {
-    for (auto& x : F.force_uN) x = -x;
-  };
-  FirmwareInHand bad(reference_profile(), hand, inverted);
-  const std::string bad_rules = broken(check_rules(backend, bad));
-  row.saw(format("%d rules pass; inverted: %s", static_cast<int>(passed), bad_rules.c_str()));
-  if (!broken(results).empty()) row.saw(broken(results));
-  CHECK_THAT(row, broken(results).empty());
-  CHECK_THAT(row, passed >= 20);
-  CHECK_THAT(row, bad_rules.find("force_direction: x") != std::string::npos);
-  CHECK_THAT(row, good.max_force_N() > 0.0 && good.max_force_N() <= kMaxPulse_N + 1e-6);
-}
-
 }  // namespace
 
 void emulated_devices(Backend backend) {
@@ -515,7 +458,6 @@ void emulated_devices(Backend backend) {
   enterprise_keys(backend);
   two_equal_space_mice(backend);
   if (backend == Backend::libusb) falcon();
-  firmware_reference(backend);
 }
 
 }  // namespace wrenchd::test

@@ -15,7 +15,9 @@
 #include <unistd.h>
 
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/ideal_encoders.hpp"
 #include "tests/support/sample_descriptors.hpp"
+#include "tests/system/kernel_attribute.hpp"
 #include "tests/system/row.hpp"
 
 namespace wrenchd::test {
@@ -28,43 +30,29 @@ const fs::path kGadget = "/sys/kernel/config/usb_gadget/wrenchd";
 const fs::path kFunction = kGadget / "functions/hid.usb0";
 constexpr std::size_t kLongestReport = 64;
 
-template <class T>
-void write(const fs::path& attribute, const T& value) {
-  std::ofstream file(attribute, std::ios::binary);
-  file << value << std::flush;
-  if (!file) throw std::runtime_error("cannot write " + attribute.string());
-}
-
-SimulationSettings ideal() {
-  SimulationSettings settings;
-  settings.position_quantum_m = 0.0;
-  settings.rotation_quantum_rad = 0.0;
-  return settings;
-}
-
 /// Describes the device to the kernel, which then offers `/dev/hidg0`.
 void define_gadget(const UsbIdentity& identity) {
   fs::create_directory(kGadget);
-  write(kGadget / "idVendor", identity.vendor);
-  write(kGadget / "idProduct", identity.product);
+  write_attribute(kGadget / "idVendor", identity.vendor);
+  write_attribute(kGadget / "idProduct", identity.product);
   fs::create_directory(kGadget / "strings/0x409");
-  write(kGadget / "strings/0x409/serialnumber", identity.serial);
+  write_attribute(kGadget / "strings/0x409/serialnumber", identity.serial);
   fs::create_directory(kGadget / "configs/c.1");
   fs::create_directory(kFunction);
-  write(kFunction / "report_length", kLongestReport);
+  write_attribute(kFunction / "report_length", kLongestReport);
   const Bytes descriptor = reference_descriptor();
-  write(kFunction / "report_desc", std::string(descriptor.begin(), descriptor.end()));
+  write_attribute(kFunction / "report_desc", std::string(descriptor.begin(), descriptor.end()));
   fs::create_directory_symlink(kFunction, kGadget / "configs/c.1/hid.usb0");
 }
 
 }  // namespace
 
 GadgetDevice::GadgetDevice(const UsbIdentity& identity, int priority)
-    : profile_(reference_profile()), firmware_(profile_, ideal(), kPeriod) {
+    : profile_(reference_profile()), firmware_(profile_, ideal_encoders(), kPeriod) {
   if (std::system("modprobe -a libcomposite usb_f_hid dummy_hcd") != 0)
     throw std::runtime_error("the kernel has no gadget driver");
   define_gadget(identity);
-  write(kGadget / "UDC", "dummy_udc.0");
+  write_attribute(kGadget / "UDC", "dummy_udc.0");
   for (int i = 0; i < 500 && node_ < 0; ++i) {
     node_ = ::open("/dev/hidg0", O_RDWR | O_NONBLOCK | O_CLOEXEC);
     if (node_ < 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));

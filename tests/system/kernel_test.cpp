@@ -33,6 +33,7 @@
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/system/emulated_devices.hpp"
+#include "tests/system/firmware_reference.hpp"
 #include "tests/system/power_saving.hpp"
 #include "tests/system/row.hpp"
 #include "tests/system/usbip_device.hpp"
@@ -576,6 +577,7 @@ int main(int argc, char** argv) {
     const HotplugMonitor monitor([&events](const HotplugEvent& event) { events.record(event); });
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, events, factor);
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) emulated_devices(backend);
+    for (const Backend backend : {Backend::hidraw, Backend::libusb}) firmware_reference(backend);
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) power_saving(backend);
   } catch (const std::exception& e) {
     std::printf("kernel test: %s\n", e.what());

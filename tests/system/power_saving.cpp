@@ -3,9 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -15,6 +13,7 @@
 #include "devices/profile_device.hpp"
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/system/gadget_device.hpp"
+#include "tests/system/kernel_attribute.hpp"
 #include "tests/system/usbip_device.hpp"
 
 namespace wrenchd::test {
@@ -26,19 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr int kPriority = 60;  ///< as in kernel_test.cpp
 constexpr int kPort = 0;
-
-std::string read(const fs::path& file) {
-  std::string text;
-  std::ifstream in(file);
-  std::getline(in, text);
-  return text;
-}
-
-void write(const fs::path& file, const std::string& text) {
-  std::ofstream out(file);
-  out << text << std::flush;
-  if (!out) throw std::runtime_error("cannot write " + file.string());
-}
 
 /// An open device, and a loop of one tick per report that releases the hand at every fault, those of the
 /// times of its ticks included. It arms only on request.
@@ -103,20 +89,19 @@ class Loop {
 /// As a laptop or a program like TLP sets it: devices that nobody uses are suspended at once.
 void autosuspend(Backend backend) {
   Row row(backend, "autosuspend without a delay",
-          "suspended while closed; opening resumes it, the first sample within 0.5 s; while open it stays "
-          "active, "
-          "also while it sends nothing for 200 ms; suspended again after closing");
+          "suspended while closed; opening resumes it, the first sample within 0.5 s; it stays active "
+          "while it is open, even if it sends nothing for 200 ms; suspended again after closing");
   const UsbIdentity identity;
   UsbipDevice far(identity, 1000.0, kPriority);
   far.plug(kPort);
   const UsbDevice listed = await_listed(identity);
   const fs::path power = fs::path("/sys/bus/usb/devices") / listed.port_path / "power";
-  write(power / "autosuspend_delay_ms", "0");
-  write(power / "control", "auto");
+  write_attribute(power / "autosuspend_delay_ms", "0");
+  write_attribute(power / "control", "auto");
   const auto await = [&](const std::string& status) {
-    for (int i = 0; i < 300 && read(power / "runtime_status") != status; ++i)
+    for (int i = 0; i < 300 && read_attribute(power / "runtime_status") != status; ++i)
       std::this_thread::sleep_for(10ms);
-    return read(power / "runtime_status") == status;
+    return read_attribute(power / "runtime_status") == status;
   };
   CHECK_THAT(row, await("suspended"));
   {
@@ -131,7 +116,7 @@ void autosuspend(Backend backend) {
     far.set(Trouble::silent);
     const Loop::Observed silent = loop.run_for(200ms);
     CHECK_THAT(row, silent.link == Fault::sample_stale && !far.record().motors_on);
-    CHECK_THAT(row, read(power / "runtime_status") == "active");
+    CHECK_THAT(row, read_attribute(power / "runtime_status") == "active");
     far.set(Trouble::none);
     loop.run_for(5ms);
     const Loop::Observed after = loop.run_for(50ms);
@@ -144,9 +129,9 @@ void autosuspend(Backend backend) {
 /// suspended, and two seconds later all of it is resumed. Only the firmware, which would switch the
 /// processor off, is left out ("core" in Documentation/power/basic-pm-debugging.rst of Linux).
 void sleep_for_two_seconds() {
-  write("/sys/module/suspend/parameters/pm_test_delay", "2");
-  write("/sys/power/pm_test", "core");
-  write("/sys/power/state", "mem");
+  write_attribute("/sys/module/suspend/parameters/pm_test_delay", "2");
+  write_attribute("/sys/power/pm_test", "core");
+  write_attribute("/sys/power/state", "mem");
 }
 
 void machine_sleeps(Backend backend) {

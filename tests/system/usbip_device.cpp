@@ -8,17 +8,11 @@
 #include <utility>
 
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/ideal_encoders.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
 namespace wrenchd::test {
 namespace {
-
-SimulationSettings ideal() {
-  SimulationSettings settings;
-  settings.position_quantum_m = 0.0;
-  settings.rotation_quantum_rad = 0.0;
-  return settings;
-}
 
 /// Returns the number of the pose that the force in x encodes.
 constexpr double kAnswerStep_N = 1e-6;
@@ -41,7 +35,7 @@ UsbipDevice::UsbipDevice(Identity identity, double rate_Hz, int priority)
     : UsbipPort(std::move(identity), {.report_descriptor = reference_descriptor()}, priority),
       period_(from_seconds(1.0 / rate_Hz)),
       profile_(reference_profile()),
-      firmware_(profile_, ideal(), period_) {
+      firmware_(profile_, ideal_encoders(), period_) {
   turn_arounds_.reserve(65536);
 }
 
