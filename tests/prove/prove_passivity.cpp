@@ -7,6 +7,7 @@
 #include <deque>
 #include <map>
 #include <numbers>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -561,13 +562,14 @@ int main(int argc, char** argv) {
                  "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  const std::map<int, DofMask> axes = {{6, kAllDofs}, {5, kAllDofs & ~0b100'000}, {3, kLinearDofs}};
-  int senses = 6, drives = 6;
+  const std::map<std::string, DofMask> axes = {
+      {"6", kAllDofs}, {"5", kAllDofs & ~0b100'000}, {"3", kLinearDofs}};
+  std::string senses = "6", drives = "6";
   app.add_option("--senses", senses, "axes that the device senses: 6, or 3 translations")
-      ->check(CLI::IsMember({3, 6}))
+      ->check(CLI::IsMember(std::set<std::string>{"3", "6"}))
       ->capture_default_str();
   app.add_option("--drives", drives, "axes that it drives: 6, 5 (no torque about z), or 3 forces")
-      ->check(CLI::IsMember({3, 5, 6}))
+      ->check(CLI::IsMember(std::set<std::string>{"3", "5", "6"}))
       ->capture_default_str();
   app.add_flag("--measured-rotation", options.measured_rotation,
                "renders undriven motion as measured, to show what the energy account prevents");
