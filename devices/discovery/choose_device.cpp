@@ -80,17 +80,18 @@ DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const
     const auto same_serial = std::count_if(candidates.begin(), candidates.end(), [&](const auto& other) {
       return connected[other.device].serial == device.serial;
     });
-    std::string key;
-    if (!device.serial.empty() && same_serial == 1)
-      key = "serial = \"" + device.serial + "\"";
-    else if (!device.port_path.empty())
-      key = "usb_port = \"" + device.port_path + "\"";
     const std::string& profile = profiles[pick.profile].name;
-    choice.rejections[pick.device] =
-        "it matches the profile " + profile + ", and other devices match too: this is " +
-        serial_text(device) + (device.port_path.empty() ? "" : " in USB port " + device.port_path) + "; " +
-        (key.empty() ? "" : "select it by profile = \"" + profile + "\" and " + key + " in [device], or ") +
-        "unplug the others";
+    std::string text =
+        "it matches the profile " + profile + ", and other devices match too: this is " + serial_text(device);
+    if (!device.port_path.empty()) text += " in USB port " + device.port_path;
+    text += "; ";
+    const bool by_serial = !device.serial.empty() && same_serial == 1;
+    if (by_serial || !device.port_path.empty()) {
+      text += "select it by profile = \"" + profile + "\" and ";
+      text += by_serial ? "serial = \"" + device.serial : "usb_port = \"" + device.port_path;
+      text += "\" in [device], or ";
+    }
+    choice.rejections[pick.device] = text + "unplug the others";
   }
   return choice;
 }
