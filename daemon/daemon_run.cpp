@@ -271,19 +271,23 @@ void open_simulated(Hand& hand) {
   log_missing_motors(hand.runtime.config().profile);
 }
 
-/// Tests a device in another process before it is armed. Such a device has no serial number, so it is tested
-/// at each start.
-void test_first(Hand& hand, Clock& clock, TimePoint end) {
+/// Opens a device in another process. Tests it before it is armed; such a device has no serial number, so it
+/// is tested at each start.
+void open_other_process(Hand& hand, Clock& clock, TimePoint end) {
   const RunConfig& config = hand.runtime.config();
   const TestedDevices tested;
-  if (hand.device.simulated != nullptr || !needs_first_test(config, nullptr, tested)) return;
-  hand.runtime.set_arming_obstacle(kTestRuns);
   const StopCondition stop = [&] { return hand.context.stop_requested() || clock.now() >= end; };
   const ReportWaiting waiting = [&](const std::string& reason) {
     hand.context.service.waiting(reason, hand.context.hand);
   };
-  const std::string obstacle =
-      run_first_test(config, *hand.device.link, nullptr, clock, stop, waiting, tested);
+  hand.runtime.set_arming_obstacle(kTestRuns);
+  std::string obstacle;
+  if (needs_first_test(config, nullptr, tested))
+    obstacle = run_first_test(config, *hand.device.link, nullptr, clock, stop, waiting, tested);
+  open_simulated(hand);
+  if (needs_direction_test(config, nullptr, tested))
+    obstacle =
+        run_direction_test(config, hand.runtime.device(), nullptr, clock, stop, waiting, tested).value_or("");
   if (!obstacle.empty()) spdlog::warn("the device cannot be armed: {}", obstacle);
   hand.runtime.set_arming_obstacle(obstacle);
 }
@@ -353,8 +357,10 @@ Fault run_one_in_wall_time(Hand& hand, WallClock& clock, TimePoint end) {
   return run_hand(hand, clock, [&](Recordings&, LiveView& view) {
     if (hand.device.plugged != nullptr)
       return run_with_device(hand.runtime, context, *hand.device.plugged, end, clock, view);
-    test_first(hand, clock, end);
-    open_simulated(hand);
+    if (hand.device.simulated != nullptr)
+      open_simulated(hand);
+    else
+      open_other_process(hand, clock, end);
     const TimePoint simulated_end = end_time(context.options, clock);
     const bool arm = context.options.arm && hand.runtime.arming_obstacle().empty();
     ScheduledRequests requests(arm, hand.device.script.commands, clock.now());

@@ -32,6 +32,14 @@ std::optional<std::string> find_obstacle(Runtime& runtime, ReconnectingLink& lin
   return obstacle;
 }
 
+/// Tests the opened and homed device by pulses, if it needs that. Returns as run_direction_test().
+std::optional<std::string> test_directions(Runtime& runtime, const UsbDevice& device, Clock& clock,
+                                           const StopCondition& stop, const ReportWaiting& waiting) {
+  const TestedDevices tested;
+  if (!needs_direction_test(runtime.config(), &device, tested)) return std::string();
+  return run_direction_test(runtime.config(), runtime.device(), &device, clock, stop, waiting, tested);
+}
+
 }  // namespace
 
 Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingLink& link, TimePoint end,
@@ -49,16 +57,21 @@ Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingL
     if (at_start) log_missing_motors(profile);
     if (!at_start) spdlog::info("the device is connected again, and is disarmed: {}", describe(device));
     runtime.set_arming_obstacle(kTestRuns);
-    const std::optional<std::string> obstacle = find_obstacle(runtime, link, clock, stop, waiting);
+    std::optional<std::string> obstacle = find_obstacle(runtime, link, clock, stop, waiting);
     if (!obstacle && stop()) return Fault::none;
     if (!obstacle) continue;
-    if (!obstacle->empty()) spdlog::warn("the device cannot be armed: {}", *obstacle);
-    runtime.set_arming_obstacle(*obstacle);
-    if (!wait_for_rest_pose(runtime, clock, stop, waiting)) {
+    if (wait_for_rest_pose(runtime, clock, stop, waiting)) {
+      if (obstacle->empty()) obstacle = test_directions(runtime, device, clock, stop, waiting);
+    } else {
+      obstacle.reset();
+    }
+    if (!obstacle) {
       runtime.close();
       if (stop()) return Fault::none;
       continue;
     }
+    if (!obstacle->empty()) spdlog::warn("the device cannot be armed: {}", *obstacle);
+    runtime.set_arming_obstacle(*obstacle);
     ScheduledRequests requests(context.options.arm && at_start && obstacle->empty(), {}, clock.now());
     const Fault fault = run_in_wall_time(runtime, context, profile.name + ", " + describe(device), end, clock,
                                          view, requests);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+
 #include "core/device_profile.hpp"
 #include "devices/layout_check.hpp"
 
@@ -11,5 +13,12 @@ namespace wrenchd {
 /// a battery state, may be absent, and reports may be as short as the profile permits. Checksums and constant
 /// bytes count as fields. Not RT-safe: allocates.
 std::vector<ExpectedReport> expected_reports(const DeviceProfile& profile);
+
+/// Returns true if any report from the device has this field.
+inline bool any_report(const DeviceProfile& profile, ReportField PoseReportLayout::*field) noexcept {
+  return (profile.pose_report.*field).present ||
+         std::any_of(profile.more_reports.begin(), profile.more_reports.end(),
+                     [field](const PoseReportLayout& report) { return (report.*field).present; });
+}
 
 }  // namespace wrenchd

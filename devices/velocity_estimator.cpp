@@ -6,6 +6,7 @@
 
 #include "core/finite.hpp"
 #include "devices/kinematics.hpp"
+#include "devices/profile_reports.hpp"
 
 namespace wrenchd {
 namespace {
@@ -35,12 +36,6 @@ VelocityEstimator::Settings joint_steps(const Kinematics& k) {
 double stated_or(double stated, double otherwise, double assumed) noexcept {
   if (is_finite(stated) && stated > 0.0) return stated;
   return is_finite(otherwise) && otherwise > 0.0 ? otherwise : assumed;
-}
-
-bool any_report(const DeviceProfile& profile, ReportField PoseReportLayout::*field) noexcept {
-  return (profile.pose_report.*field).present ||
-         std::any_of(profile.more_reports.begin(), profile.more_reports.end(),
-                     [field](const PoseReportLayout& report) { return (report.*field).present; });
 }
 
 }  // namespace

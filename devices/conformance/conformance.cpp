@@ -12,6 +12,7 @@
 
 #include "core/finite.hpp"
 #include "devices/conformance/device_session.hpp"
+#include "devices/conformance/direction_pulses.hpp"
 #include "devices/conformance/reported_velocity.hpp"
 #include "devices/discovery/shared_usb_ids.hpp"
 #include "devices/layout_check.hpp"
@@ -25,26 +26,20 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Least and largest number of pulses along an axis.
-constexpr int kMinPulses = 3, kMaxPulses = 6;
-
 /// Durations of the parts of a check.
 struct Pace {
   /// Time in which the check only observes the device. The jitter of the host changes a rate over one second
   /// by less than 1 %.
   Duration listen;
-  Duration series;      ///< duration of the first commands
-  Duration silence;     ///< time without commands, longer than the longest hold time
-  int pulses;           ///< number along each axis; up to kMaxPulses if the response is not significant
-  Duration pulse;       ///< each half of a pulse
-  Duration after_axis;  ///< time after the pulses along an axis, in which the handle comes to rest
+  Duration series;   ///< duration of the first commands
+  Duration silence;  ///< time without commands, longer than the longest hold time
+  const PulsePace& pulses;
 };
-constexpr Pace kThorough = {1s, 300ms, 80ms, kMaxPulses, 40ms, 100ms};
-constexpr Pace kBrief = {300ms, 120ms, 45ms, kMinPulses, 30ms, 30ms};
+constexpr Pace kThorough = {1s, 300ms, 80ms, kThoroughPulses};
+constexpr Pace kBrief = {300ms, 120ms, 45ms, kBriefPulses};
 
 // Sections of devices/README.md.
 constexpr const char* kPoseSection = "Pose report, device to host";
-constexpr const char* kUnitsSection = "Frames, units and signs";
 constexpr const char* kUsbSection = "USB";
 std::string rule_section(int rule) {
   return fmt::format("Rules for firmware, rule {}", rule);
@@ -61,23 +56,7 @@ constexpr double kMaxRateError = 0.1;
 /// not.
 constexpr double kMaxClockError = 0.05;
 
-/// Path length along and about an axis that is enough to judge its velocity.
-struct Travel {
-  double m, rad;
-  double of(std::size_t axis) const { return axis < 3 ? m : rad; }
-};
 constexpr Travel kTravelByHand = {0.010, 0.10};
-/// Path length for the motion by pulses. It is at least kTravelPerStep steps of the report's numbers.
-constexpr Travel kTravelByPulses = {0.0005, 0.005};
-constexpr double kTravelPerStep = 20.0;
-constexpr double kMinTurn_rad = 0.2;
-/// Slope of the reported over the differenced velocity.
-constexpr double kMinSlope = 0.7, kMaxSlope = 1.3;
-/// Below this slope the reported velocity counts as zero.
-constexpr double kZeroSlope = 0.1;
-constexpr double kMaxResidual = 0.35;
-/// Correlation above which two velocities agree.
-constexpr double kAgree = 0.9;
 
 /// The layout's limit of the hold time.
 constexpr double kMaxHold_s = 0.032;
@@ -92,17 +71,17 @@ constexpr double kShortHold_s = 0.008;
 /// First sequence of the commands: they wrap in the first series.
 constexpr std::uint64_t kFirstSequence = 65536 - 100;
 constexpr Duration kSettle = 30ms;
+/// Least displacement by a pulse that is not a step of the report's numbers, in such steps.
+constexpr double kLeastSteps_m = 2.0, kLeastSteps_rad = 4.0;
 /// Attempts of a check that a delay of the host can spoil.
 constexpr int kAttempts = 3;
 
-/// Share of the profile's limits that a pulse may have.
-constexpr double kPulseShare = 0.05;
-/// A response is significant if it exceeds this multiple of its standard error.
-constexpr double kSignificance = 5.0;
-/// The pulses stop if the handle moves by more than this in one half.
-constexpr double kMaxPulseTravel_m = 0.02, kMaxPulseTurn_rad = 0.3;
-
-constexpr std::array<const char*, 3> kAxisNames = {"x", "y", "z"};
+std::vector<MotionSample> motion_samples(const DeviceSession& session) {
+  std::vector<MotionSample> samples;
+  for (const ReceivedReport& r : session.reports())
+    if (r.outcome == Decoding::ok) samples.push_back({r.device_time_s, r.content.X_BH, r.content.V_BH});
+  return samples;
+}
 
 std::string milliseconds(double s) {
   return fmt::format("{:.1f} ms", 1e3 * s);
@@ -117,25 +96,19 @@ struct WatchdogTrial {
   double most_s = 0.0;
 };
 
-/// Displacement of the handle by pulses along one axis.
-struct PulseResponse {
-  int pulses = 0;
-  bool stopped = false;  ///< the handle moved too far
-  Vector3d mean = Vector3d::Zero();
-  Vector3d error = Vector3d::Zero();  ///< standard error of the mean
+/// A session as the pulses drive it.
+class PulsedSession final : public PulsedDevice {
+ public:
+  explicit PulsedSession(DeviceSession& session) : session_(session) {}
 
-  void average(const std::vector<Vector3d>& moved) {
-    const auto n = static_cast<double>(moved.size());
-    mean.setZero();
-    for (const Vector3d& m : moved) mean += m / n;
-    Vector3d squares = Vector3d::Zero();
-    for (const Vector3d& m : moved) squares += (m - mean).cwiseAbs2();
-    error = (squares / (n * std::max(n - 1.0, 1.0))).cwiseSqrt();
+  std::vector<MotionSample> drive(Duration time, const Wrench& F) override {
+    session_.clear();
+    session_.drive(time, true, kMaxHold_s, F);
+    return motion_samples(session_);
   }
-  bool is_significant(int axis, double least) const {
-    return pulses >= kMinPulses && !stopped &&
-           std::abs(mean[axis]) > std::max(kSignificance * error[axis], least);
-  }
+
+ private:
+  DeviceSession& session_;
 };
 
 class Conformance {
@@ -165,6 +138,9 @@ class Conformance {
   void add(std::string rule, bool passed, std::string seen, std::string section) {
     results_.push_back(
         {std::move(rule), passed ? Judgement::pass : Judgement::fail, std::move(seen), std::move(section)});
+  }
+  void add(std::string rule, Finding finding, std::string section) {
+    results_.push_back({std::move(rule), finding.judgement, std::move(finding.seen), std::move(section)});
   }
   void skip(std::string rule, std::string why, std::string section) {
     results_.push_back({std::move(rule), Judgement::not_judged, std::move(why), std::move(section)});
@@ -347,27 +323,24 @@ class Conformance {
     }
     const VelocityComparison seen = observe_motion();
     const bool order_known = judge_order(seen, angular);
-    judge_velocity(seen, "linear_velocity", 0, linear, true, kTravelByHand);
-    judge_velocity(seen, "angular_velocity", 3, angular, order_known, kTravelByHand);
-  }
-
-  Travel travel_by_pulses() const {
-    return {std::max(kTravelByPulses.m, kTravelPerStep * profile_.pose_report.position.step),
-            std::max(kTravelByPulses.rad, kTravelPerStep * profile_.pose_report.orientation.step)};
+    judge_velocity(seen, "linear_velocity", kLinearDofs, linear, true, kTravelByHand);
+    judge_velocity(seen, "angular_velocity", kAngularDofs, angular, order_known, kTravelByHand);
   }
 
   /// Judges each velocity by the motion of the pulses if the motion of the user could not judge it.
-  void judge_velocities_of_pulses() {
-    const VelocityComparison seen = compare_velocities(pulse_motion_);
-    const auto judge = [&](const char* rule, std::size_t first, bool present, bool pose_known) {
+  void judge_velocities_of_pulses(const DirectionPulses& pulses) {
+    const VelocityComparison seen = compare_velocities(pulses.motion());
+    const Travel enough =
+        least_travel_by_pulses(profile_.pose_report.position.step, profile_.pose_report.orientation.step);
+    const auto judge = [&](const char* rule, DofMask axes, bool present, bool pose_known) {
       const auto known =
           std::find_if(results_.begin(), results_.end(), [&](const RuleResult& r) { return r.rule == rule; });
       if (!present || known == results_.end() || known->judgement != Judgement::not_judged) return;
       results_.erase(known);
-      judge_velocity(seen, rule, first, present, pose_known, travel_by_pulses());
+      judge_velocity(seen, rule, axes, present, pose_known, enough);
     };
-    judge("linear_velocity", 0, profile_.pose_report.linear_velocity.present, true);
-    judge("angular_velocity", 3, profile_.pose_report.angular_velocity.present,
+    judge("linear_velocity", kLinearDofs, profile_.pose_report.linear_velocity.present, true);
+    judge("angular_velocity", kAngularDofs, profile_.pose_report.angular_velocity.present,
           passed("torque_direction") && !failed("quaternion_order"));
   }
 
@@ -380,7 +353,7 @@ class Conformance {
     VelocityComparison seen;
     for (Duration spent{}; spent < options_.motion_time; spent += 200ms) {
       session_.listen(200ms);
-      seen = compare_velocities(motion_samples());
+      seen = compare_velocities(motion_samples(session_));
       bool enough = seen.turned_rad >= kMinTurn_rad;
       for (std::size_t i = 0; i < 6; ++i) enough = enough && seen.axes[i].travel >= kTravelByHand.of(i);
       if (enough) break;
@@ -389,72 +362,25 @@ class Conformance {
     return seen;
   }
 
-  std::vector<MotionSample> motion_samples() const {
-    std::vector<MotionSample> samples;
-    for (const ReceivedReport& r : session_.reports())
-      if (r.outcome == Decoding::ok) samples.push_back({r.device_time_s, r.content.X_BH, r.content.V_BH});
-    return samples;
-  }
-
   /// Returns false if the order of the quaternion is wrong. Without an angular velocity there is nothing to
   /// compare the orientation with.
   bool judge_order(const VelocityComparison& seen, bool angular) {
-    const char* rule = "quaternion_order";
-    const double stated = seen.rotation_correlation, swapped = seen.w_first_correlation;
     if (!angular) {
-      skip(rule, "the profile has no angular velocity to compare it with", kUnitsSection);
-    } else if (seen.turned_rad < kMinTurn_rad) {
-      skip(rule, "the handle was not turned", kUnitsSection);
-    } else if (stated == 0.0 && swapped == 0.0) {
-      skip(rule, "the reported angular velocity is 0", kUnitsSection);
-    } else if (stated < kAgree && swapped > kAgree) {
-      add(rule, false, "the angular velocity agrees with w x y z, and not with x y z w", kUnitsSection);
-      return false;
-    } else if (std::abs(stated) > kAgree) {
-      add(rule, true, "x y z w, by the angular velocity", kUnitsSection);
-    } else {
-      skip(rule, "the angular velocity agrees with no order", kUnitsSection);
+      skip("quaternion_order", "the profile has no angular velocity to compare it with", kUnitsSection);
+      return true;
     }
-    return true;
+    add("quaternion_order", judge_quaternion_order(seen), kUnitsSection);
+    return !failed("quaternion_order");
   }
 
-  void judge_velocity(const VelocityComparison& seen, const char* rule, std::size_t first, bool present,
+  void judge_velocity(const VelocityComparison& seen, const char* rule, DofMask axes, bool present,
                       bool pose_known, const Travel& enough) {
-    if (!present || !pose_known) {
-      skip(rule,
-           present ? "the order of the quaternion is not known to be right"
-                   : "the profile has none; wrenchd estimates it",
-           rule_section(4));
-      return;
-    }
-    std::string wrong, right, unmoved;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const VelocityAgreement& axis = seen.axes[first + k];
-      if (axis.travel < enough.of(first + k)) {
-        unmoved += fmt::format(" {}", kAxisNames[k]);
-        continue;
-      }
-      const std::string error = velocity_error(axis);
-      const std::string part =
-          fmt::format("{}: {:.2f} times the differenced pose", kAxisNames[k], axis.slope);
-      (error.empty() ? right : wrong) +=
-          ((error.empty() ? right : wrong).empty() ? "" : "; ") + part + (error.empty() ? "" : ", " + error);
-    }
-    if (!wrong.empty())
-      add(rule, false, wrong, rule_section(4));
-    else if (!unmoved.empty())
-      skip(rule, "the handle was not moved enough:" + unmoved + (right.empty() ? "" : ". " + right),
-           rule_section(4));
+    if (!present)
+      skip(rule, "the profile has none; wrenchd estimates it", rule_section(4));
+    else if (!pose_known)
+      skip(rule, "the order of the quaternion is not known to be right", rule_section(4));
     else
-      add(rule, true, right, rule_section(4));
-  }
-
-  static std::string velocity_error(const VelocityAgreement& axis) {
-    if (axis.slope < -kMinSlope) return "the sign is inverted";
-    if (std::abs(axis.slope) < kZeroSlope && axis.residual < kZeroSlope) return "it is zero";
-    if (axis.slope < kMinSlope || axis.slope > kMaxSlope) return "the scale or the axis is wrong";
-    if (axis.residual > kMaxResidual) return "it does not follow the motion";
-    return {};
+      add(rule, wrenchd::judge_velocity(seen, axes, enough), rule_section(4));
   }
 
   // --- commands ------------------------------------------------------------
@@ -770,90 +696,21 @@ class Conformance {
       for (const char* rule : rules) skip(rule, why, kUnitsSection);
       return;
     }
-    user_.instruct(fmt::format("Pulses of at most {:.2f} N and {:.3f} N.m follow.", pulse_N(), pulse_Nm()));
-    judge_direction("force_direction", true);
+    const double pulse_N = pulse_force_N(profile_), pulse_Nm = pulse_torque_Nm(profile_);
+    user_.instruct(fmt::format("Pulses of at most {:.2f} N and {:.3f} N.m follow.", pulse_N, pulse_Nm));
+    PulsedSession device(session_);
+    DirectionPulses pulses(device, pace_.pulses);
+    add("force_direction",
+        pulses.judge_force(pulse_N, kLinearDofs, kLeastSteps_m * profile_.pose_report.position.step),
+        kUnitsSection);
     if (failed("quaternion_order"))
       skip("torque_direction", "the order of the quaternion is wrong", kUnitsSection);
     else
-      judge_direction("torque_direction", false);
-    if (reports_valid_ && norm_works_) judge_velocities_of_pulses();
-  }
-
-  /// Least displacement that is not a step of the report's numbers.
-  double least_shift(bool force) const {
-    return force ? 2.0 * profile_.pose_report.position.step : 4.0 * profile_.pose_report.orientation.step;
-  }
-  double pulse_N() const { return std::min(kMaxPulse_N, kPulseShare * profile_.max_force_N); }
-  double pulse_Nm() const { return std::min(kMaxPulse_Nm, kPulseShare * profile_.max_torque_Nm); }
-
-  void judge_direction(const char* rule, bool force) {
-    std::string wrong, right, unclear;
-    for (int axis = 0; axis < 3; ++axis) {
-      const char* name = kAxisNames[static_cast<std::size_t>(axis)];
-      const PulseResponse r = apply_pulses(axis, force);
-      const auto significant = [&](int k) { return r.is_significant(k, least_shift(force)); };
-      int strongest = 0;
-      r.mean.cwiseAbs().maxCoeff(&strongest);
-      const std::string part = fmt::format("{}: {:+.3f} {}", name, 1e3 * r.mean[axis], force ? "mm" : "mrad");
-      if (significant(axis) && r.mean[axis] < 0.0 && strongest == axis)
-        wrong += (wrong.empty() ? "" : "; ") + part + ", the sign is inverted";
-      else if (significant(strongest) && strongest != axis)
-        wrong += (wrong.empty() ? "" : "; ") + std::string(name) + " moves the handle along " +
-                 kAxisNames[static_cast<std::size_t>(strongest)];
-      else if (significant(axis))
-        right += (right.empty() ? "" : "; ") + part;
-      else
-        unclear += std::string(" ") + name + (r.stopped ? " (the handle moved too far)" : "");
-    }
-    if (!wrong.empty())
-      add(rule, false, wrong, kUnitsSection);
-    else if (!unclear.empty())
-      skip(rule,
-           "the motion does not show the direction of" + unclear + "; hold the handle still and loosely",
-           kUnitsSection);
-    else
-      add(rule, true, right, kUnitsSection);
-  }
-
-  /// Applies pulses of both signs in turn. The difference of the two displacements does not contain a steady
-  /// motion of the hand.
-  PulseResponse apply_pulses(int axis, bool force) {
-    Wrench F;
-    (force ? F.force_N : F.torque_Nm)[axis] = force ? pulse_N() : pulse_Nm();
-    PulseResponse response;
-    std::vector<Vector3d> moved;
-    session_.drive(kSettle, true, kMaxHold_s);
-    // Half a pulse before the first one, so that every pulse begins with the motion of the one before it.
-    session_.drive(pace_.pulse / 2, true, kMaxHold_s, -1.0 * F);
-    while (response.pulses < kMaxPulses && !response.stopped) {
-      const Vector3d up = displacement(F, force), down = displacement(-1.0 * F, force);
-      ++response.pulses;
-      response.stopped = too_far(up, force) || too_far(down, force);
-      if (response.stopped) break;
-      moved.push_back(0.5 * (up - down));
-      response.average(moved);
-      int strongest = 0;
-      response.mean.cwiseAbs().maxCoeff(&strongest);
-      if (response.pulses >= pace_.pulses && response.is_significant(strongest, least_shift(force))) break;
-    }
-    session_.drive(pace_.after_axis, true, kMaxHold_s);
-    return response;
-  }
-
-  static bool too_far(const Vector3d& moved, bool force) {
-    return moved.norm() > (force ? kMaxPulseTravel_m : kMaxPulseTurn_rad);
-  }
-
-  Vector3d displacement(const Wrench& F, bool force) {
-    const Pose start = latest().X_BH;
-    session_.clear();
-    session_.drive(pace_.pulse, true, kMaxHold_s, F);
-    const std::vector<MotionSample> motion = motion_samples();
-    pulse_motion_.insert(pulse_motion_.end(), motion.begin(), motion.end());
-    const Pose& end = latest().X_BH;
-    if (force) return end.translation_m - start.translation_m;
-    return rotation_vector(
-        (end.rotation.normalized() * start.rotation.normalized().conjugate()).normalized());
+      add("torque_direction",
+          pulses.judge_torque(pulse_Nm, kAngularDofs,
+                              kLeastSteps_rad * profile_.pose_report.orientation.step),
+          kUnitsSection);
+    if (reports_valid_ && norm_works_) judge_velocities_of_pulses(pulses);
   }
 
   // --- the end ------------------------------------------------------------
@@ -878,8 +735,7 @@ class Conformance {
   std::vector<RuleResult> results_;
   /// Valid reports of listen(). The pointers are valid until the session is cleared.
   std::vector<const ReceivedReport*> valid_;
-  std::vector<MotionSample> pulse_motion_;  ///< reports during the pulses
-  bool reports_valid_ = false;              ///< enough reports of listen() were valid
+  bool reports_valid_ = false;  ///< enough reports of listen() were valid
   bool sequence_works_ = false;
   bool norm_works_ = false;
   bool trusted_ = false;

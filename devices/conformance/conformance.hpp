@@ -1,31 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
+#include "devices/conformance/rule_result.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "devices/links/report_link.hpp"
 
 namespace wrenchd {
-
-enum class Judgement : std::uint8_t {
-  pass,
-  fail,
-  not_judged,  ///< the rule could not be judged; `seen` states why
-};
-
-/// Result of one rule of the open report layout.
-struct RuleResult {
-  std::string rule;  ///< such as "watchdog"
-  Judgement judgement;
-  std::string seen;     ///< what was observed, with numbers
-  std::string section;  ///< section of devices/README.md that states the rule
-};
 
 struct ConformanceOptions {
   /// Longest time in which the user moves the handle; 0: the user is not asked, and only the motion by pulses
@@ -43,13 +29,9 @@ struct ConformanceUser {
   std::function<bool()> cancelled;                   ///< returns true if the user has cancelled
 };
 
-/// Largest force and torque that a check of the rules applies, whatever the profile permits.
-inline constexpr double kMaxPulse_N = 0.5;
-inline constexpr double kMaxPulse_Nm = 0.02;
-
 /// Checks the rules of devices/README.md for a device with the open report layout, in this order: it listens,
-/// asks the user to move the handle, sends commands with zero wrench, and applies short pulses of at most
-/// kMaxPulse_N and kMaxPulse_Nm, and at most a twentieth of the limits of the profile. Nothing is written to
+/// asks the user to move the handle, sends commands with zero wrench, and applies short pulses
+/// (DirectionPulses). Nothing is written to
 /// a device whose reports are not valid, and no pulse to a device without a working watchdog. The device is
 /// released on every way out.
 ///

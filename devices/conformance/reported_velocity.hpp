@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 
+#include "core/device_profile.hpp"
 #include "core/spatial.hpp"
+#include "devices/conformance/rule_result.hpp"
 
 namespace wrenchd {
 
@@ -41,5 +44,28 @@ struct VelocityComparison {
 ///
 /// The samples must follow each other without long gaps. Not RT-safe: intended for tools.
 VelocityComparison compare_velocities(std::span<const MotionSample> samples);
+
+/// Returns the rotation vector from one orientation to another, in the axes of B. The quaternions need not
+/// have norm 1.
+Vector3d turn_between(const Quaterniond& from, const Quaterniond& to);
+
+/// Path length along and about an axis that is enough to judge its velocity.
+struct Travel {
+  double m = 0.0, rad = 0.0;
+  double of(std::size_t axis) const { return axis < 3 ? m : rad; }
+};
+
+/// Path length that is enough while pulses move the handle, for a device with these steps of its numbers.
+Travel least_travel_by_pulses(double step_m, double step_rad) noexcept;
+
+/// Least rotation that is enough to judge the order of the quaternion.
+inline constexpr double kMinTurn_rad = 0.2;
+
+/// Judges the order of the quaternion by the reported angular velocity. Not RT-safe.
+Finding judge_quaternion_order(const VelocityComparison& seen);
+
+/// Judges the sign, scale and axis of the reported velocity along these degrees of freedom, all linear or all
+/// angular. Not RT-safe.
+Finding judge_velocity(const VelocityComparison& seen, DofMask axes, const Travel& enough);
 
 }  // namespace wrenchd

@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <csignal>
+#include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 
 #include <catch2/catch.hpp>
 
+#include "config/load_profile.hpp"
 #include "daemon/first_test.hpp"
+#include "daemon/wall_clock.hpp"
 #include "devices/conformance/conformance.hpp"
+#include "devices/conformance/direction_pulses.hpp"
 #include "devices/links/loopback_link.hpp"
+#include "devices/links/simulated_link.hpp"
 #include "devices/simulation/reference_profile.hpp"
+#include "tests/support/device_process.hpp"
 #include "tests/support/firmware_in_hand.hpp"
 #include "tests/support/firmware_mistakes.hpp"
 #include "tests/support/firmware_process.hpp"
@@ -139,14 +147,22 @@ TEST_CASE("a device without valid reports fails its first test", "[first_test]")
 }
 
 TEST_CASE(
-    "only devices with motors and the open layout are tested, and only if the configuration asks for it",
+    "only devices with motors are tested, by the test of their layout, if the configuration asks for it",
     "[first_test]") {
   Bench bench;
+  const auto needs_pulses = [&] { return needs_direction_test(bench.config, &bench.usb, bench.tested); };
+  CHECK_FALSE(needs_pulses());
   bench.config.settings.device.first_test = false;
   CHECK_FALSE(bench.needed());
   bench.config.settings.device.first_test = true;
   bench.config.profile.pose_report.position.byte = 9;
   CHECK_FALSE(bench.needed());
+  CHECK(needs_pulses());
+  bench.config.settings.device.first_test = false;
+  CHECK_FALSE(needs_pulses());
+  bench.config.settings.device.first_test = true;
+  bench.config.profile.has_output = false;
+  CHECK_FALSE(needs_pulses());
 }
 
 TEST_CASE("a rule that failed once must pass in the second test, not merely escape judgement",
@@ -189,6 +205,131 @@ TEST_CASE("wrenchd arms no device whose force is inverted, neither by an option 
       CHECK(armed.exit_code == 1);
       CHECK_THAT(armed.err, Contains("force_direction"));
       CHECK(device.max_force_N() <= kMaxPulse_N + 1e-6);
+    }
+    wrenchd.signal(SIGTERM);
+    wrenchd.wait();
+  }
+}
+
+// --- devices with other report layouts --------------------------------------------------------------------
+
+namespace {
+
+DeviceProfile shipped(const std::string& name) {
+  return load_profile(source_path("config/profiles/" + name + ".toml"), SearchPath({source_path("config")}));
+}
+
+DeviceProfile inverted(DeviceProfile profile) {
+  for (double& effort : profile.kinematics.effort_per_Nm) effort = -effort;
+  return profile;
+}
+
+/// An emulated arm of the shipped profile, opened with a right or wrong profile.
+struct ArmBench {
+  ArmBench(const DeviceProfile& built, const DeviceProfile& believed,
+           const SimulationSettings& hand = holding_hand())
+      : link(make_simulated_link(built, hand, clock)), device(believed, *link), tested(files.path()) {
+    config.profile = believed;
+    config.simulated = false;
+    usb.serial = "F1";
+    device.open();
+  }
+  std::optional<std::string> run(const StopCondition& stop = [] { return false; }) {
+    return run_direction_test(
+        config, device, &usb, clock, stop, [this](const std::string& text) { waited.push_back(text); },
+        tested);
+  }
+  bool needed() const { return needs_direction_test(config, &usb, tested); }
+
+  const TemporaryDirectory files;
+  VirtualClock clock;
+  std::unique_ptr<SimulatedLink> link;
+  ProfileDevice device;
+  RunConfig config;
+  UsbDevice usb;
+  TestedDevices tested;
+  std::vector<std::string> waited;
+};
+
+}  // namespace
+
+TEST_CASE("a Falcon, a Polhem and a WoodenHaptics pass the test by pulses, and are not tested again",
+          "[first_test]") {
+  for (const char* name : {"falcon", "polhem", "woodenhaptics"}) {
+    INFO(name);
+    ArmBench bench(shipped(name), shipped(name));
+    CHECK(bench.needed());
+    CHECK(bench.run() == "");
+    CHECK_FALSE(bench.needed());
+    CHECK(bench.link->device().motor_wrench().force_N.norm() == 0.0);
+  }
+}
+
+TEST_CASE("a device of another layout whose force is inverted cannot be armed", "[first_test]") {
+  for (const char* name : {"falcon", "polhem", "woodenhaptics"}) {
+    INFO(name);
+    ArmBench bench(shipped(name), inverted(shipped(name)));
+    const auto obstacle = bench.run();
+    REQUIRE(obstacle);
+    CHECK_THAT(*obstacle, Contains("force_direction") && Contains("the sign is inverted") &&
+                              Contains("correct its profile"));
+    CHECK(bench.needed());
+    CHECK(bench.link->device().motor_wrench().force_N.norm() == 0.0);
+  }
+}
+
+TEST_CASE("the test by pulses waits until a person has homed the device", "[first_test]") {
+  ArmBench bench(shipped("falcon"), shipped("falcon"));
+  CHECK(bench.run() == "");
+  REQUIRE(bench.waited.size() == 2);
+  CHECK_THAT(bench.waited[0], Contains("not homed"));
+  CHECK_THAT(bench.waited[1], Contains("is tested"));
+}
+
+TEST_CASE("an arm whose force cannot be seen may be armed, and is tested again", "[first_test]") {
+  ArmBench bench(shipped("polhem"), shipped("polhem"), clamped());
+  CHECK(bench.run() == "");
+  CHECK(bench.needed());
+}
+
+TEST_CASE("the test by pulses ends without a result if the device is lost, or at a signal", "[first_test]") {
+  ArmBench lost(shipped("polhem"), shipped("polhem"));
+  lost.link->device().inject(
+      {SimulatedFault::Kind::unplug, std::chrono::milliseconds(300), std::chrono::hours(1)});
+  CHECK_FALSE(lost.run());
+  ArmBench stopped(shipped("polhem"), shipped("polhem"));
+  CHECK_FALSE(stopped.run([&] { return seconds(stopped.clock.now().time_since_epoch()) > 0.4; }));
+  CHECK(stopped.needed());
+}
+
+TEST_CASE("a device that sends nothing valid cannot be tested, so it cannot be armed", "[first_test]") {
+  ArmBench bench(shipped("polhem"), shipped("polhem"));
+  bench.link->device().inject({SimulatedFault::Kind::silence, Duration{0}, std::chrono::hours(1)});
+  const auto obstacle = bench.run();
+  REQUIRE(obstacle);
+  CHECK_THAT(*obstacle, Contains("sends no valid pose") && Contains("plug it in again"));
+}
+
+TEST_CASE("wrenchd arms no arm in another process whose force is inverted", "[first_test][wall_time]") {
+  const MachineLoad load;
+  const TemporaryDirectory files;
+  for (const bool good : {true, false}) {
+    WallClock clock;
+    DeviceProfile built = shipped("falcon");
+    const auto link = make_simulated_link(good ? built : inverted(built), holding_hand(), clock);
+    DeviceInHand& falcon = link->device();
+    falcon.open(clock.now());
+    std::atomic<double> max_force_N{0.0};
+    const DeviceProcess process(
+        falcon, [&] { max_force_N = std::max(max_force_N.load(), falcon.motor_wrench().force_N.norm()); });
+    RunningProgram wrenchd("wrenchd", {"--profile", source_path("config/profiles/falcon.toml"), "--link-fd",
+                                       process.socket(), "--realtime", "best_effort", "--control",
+                                       (files.path() / "control.sock").string(), "--arm"});
+    if (good) {
+      REQUIRE_RATE(load, wrenchd.wait_for_output("active"));
+    } else {
+      REQUIRE_RATE(load, wrenchd.wait_for_output("the device cannot be armed: it failed the test"));
+      CHECK(max_force_N <= kMaxPulse_N + 1e-6);
     }
     wrenchd.signal(SIGTERM);
     wrenchd.wait();

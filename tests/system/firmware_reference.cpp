@@ -8,6 +8,7 @@
 
 #include "daemon/wall_clock.hpp"
 #include "devices/conformance/conformance.hpp"
+#include "devices/conformance/direction_pulses.hpp"
 #include "devices/links/link_settings.hpp"
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/support/firmware_in_hand.hpp"

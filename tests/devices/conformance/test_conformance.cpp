@@ -14,6 +14,7 @@
 #include "config/load_profile.hpp"
 #include "devices/conformance/conformance.hpp"
 #include "devices/conformance/device_session.hpp"
+#include "devices/conformance/direction_pulses.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/simulation/reference_profile.hpp"
 #include "tests/support/firmware_in_hand.hpp"
