@@ -68,6 +68,8 @@ Fault run_with_device(Runtime& runtime, const RunContext& context, ReconnectingL
     if (!obstacle) {
       runtime.close();
       if (stop()) return Fault::none;
+      spdlog::warn("the device was disconnected before it was ready; waiting for it");
+      waiting("the device was unplugged");
       continue;
     }
     if (!obstacle->empty()) spdlog::warn("the device cannot be armed: {}", *obstacle);

@@ -95,8 +95,10 @@ usb = ["1209:6d0f"]
 [pose_report]
 sequence = "none"
 )";
-/// The self-test is off, because a mock on a busy machine cannot pass it.
-const char* const kLenient = "[servo]\nself_test_s = 0\n";
+/// Both tests of the device are off, because a mock on a busy machine cannot pass them.
+const char* const kLenient = "[device]\nfirst_test = false\n[servo]\nself_test_s = 0\n";
+/// As kLenient, with the test before the first arming.
+const char* const kTested = "[servo]\nself_test_s = 0\n";
 
 }  // namespace
 
@@ -136,6 +138,24 @@ TEST_CASE("wrenchd waits for its device and, after it is connected again, is dis
   CHECK((result.exit_code == 0 || result.exit_code == kExitFault));
   CHECK_THAT(result.err, Contains("the hand is released"));
   REQUIRE_RATE(load, result.exit_code == 0);
+}
+
+TEST_CASE("a device that is unplugged during its first test is waited for", "[usb]") {
+  const MachineLoad load;
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile = files.write("patient.toml", kPatient).string();
+  const std::string config = files.write("tested.toml", kTested).string();
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
+  REQUIRE_RATE(load, wrenchd.wait_for_output("waiting for it"));
+  std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
+  REQUIRE_RATE(load, wrenchd.wait_for_output("the device is tested before it is armed for the first time"));
+  handle->unplug();
+  REQUIRE_RATE(load, wrenchd.wait_for_output("disconnected before it was ready; waiting for it"));
+  handle.reset();
+  wrenchd.signal(SIGTERM);
+  CHECK(wrenchd.wait().exit_code == 0);
 }
 
 TEST_CASE("without a profile name wrenchd selects the profile of the device", "[usb]") {
