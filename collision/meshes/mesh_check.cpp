@@ -24,7 +24,6 @@
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
 #include <CGAL/Projection_traits_3.h>
 #include <CGAL/Surface_mesh.h>
@@ -33,13 +32,14 @@
 #include "collision/meshes/defect_count.hpp"
 #include "collision/meshes/half_edges.hpp"
 #include "collision/meshes/mesh_repair.hpp"
+#include "collision/meshes/self_intersection.hpp"
 
 namespace wrenchd {
 namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using SurfaceMesh = ExactMesh;
 using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
 
 std::string edge_place(const PolygonSoup& soup, const Edge& e) {
@@ -320,7 +320,6 @@ class WindingNumber {
   CGAL::Bbox_3 box_;
 };
 
-using FacePair = std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>;
 using ShellOfFace = std::vector<std::size_t>;
 
 ShellOfFace shells_of(const SurfaceMesh& mesh) {
@@ -368,9 +367,7 @@ std::string intersection_text(const SurfaceMesh& mesh, const std::vector<FacePai
 
 void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh,
                              const std::vector<std::size_t>& face_of, MeshReport& report) {
-  std::vector<FacePair> pairs;
-  PMP::self_intersections(mesh, std::back_inserter(pairs),
-                          CGAL::parameters::maximum_number(kMaxIntersections));
+  const std::vector<FacePair> pairs = self_intersections(mesh, kMaxIntersections);
   if (pairs.empty()) return;
   const ShellOfFace shell = shells_of(mesh);
   if (pairs.size() < kMaxIntersections) {

@@ -9,14 +9,13 @@
 #include <optional>
 #include <utility>
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
-#include <CGAL/Surface_mesh.h>
 #include <Eigen/Geometry>
 
 #include "collision/meshes/edge_collapse.hpp"
 #include "collision/meshes/flat_regions.hpp"
 #include "collision/meshes/half_edge_mesh.hpp"
+#include "collision/meshes/self_intersection.hpp"
+#include "core/in_parallel.hpp"
 #include "core/least_distance.hpp"
 #include "core/static_vector.hpp"
 
@@ -39,6 +38,8 @@ constexpr std::array kPasses = {1e-4, 3e-3, 3e-2, 0.1, 0.3, 1.0};
 /// A pass repeats its sweeps until a sweep removes less than this fraction of the vertices.
 constexpr double kMinProgress = 0.002;
 constexpr int kMaxSweeps = 60;
+/// The surface is divided into at most kMaxParts parts of at least kMinPartVertices vertices.
+constexpr std::size_t kMaxParts = 8, kMinPartVertices = 50'000;
 /// Number of attempts with a smaller tolerance if the result intersects itself, and the factor between them.
 constexpr int kAttempts = 3;
 constexpr double kSmallerTolerance = 0.1;
@@ -63,6 +64,7 @@ class Simplifier {
     source_.resize(mesh_.vertex_count());
     for (std::uint32_t v = 0; v < mesh_.vertex_count(); ++v) source_[v] = v;
     remaining_ = mesh_.vertex_count();
+    divide();
   }
 
   /// The first pass merges only what is flat to rounding, so that flat faces stay exactly flat.
@@ -81,6 +83,16 @@ class Simplifier {
   }
 
  private:
+  using Part = std::uint8_t;
+  using Planes = LeastDistance<3, kMaxStar>;
+  /// What one thread needs to collapse the edges of one part of the surface.
+  struct Worker {
+    Worker(const HalfEdgeMesh& mesh, const std::vector<FaceState>& faces) : collapse(mesh, faces) {}
+    EdgeCollapse collapse;
+    std::vector<std::uint32_t> deferred;  ///< half-edges of this part that wait for the seams
+    std::size_t collapses = 0;            ///< in this sweep
+  };
+
   /// Collapses edges until a sweep finds few more.
   void collapse_until_done() {
     for (int sweep = 0; sweep < kMaxSweeps; ++sweep)
@@ -116,19 +128,13 @@ class Simplifier {
     for (std::uint32_t f = 0; f < mesh_.face_count(); ++f)
       faces_[f].plane = regions.planes[regions.region_of_face[f]];
     std::vector<double> moved_m(mesh_.vertex_count(), 0.0);
-    for (std::uint32_t v = 0; v < mesh_.vertex_count(); ++v) {
-      if (mesh_.valence(v) == 0 || mesh_.valence(v) > kMaxStar) continue;
-      StaticVector<std::uint32_t, kMaxStar> around;
-      mesh_.for_each_outgoing(v, [&](std::uint32_t h) {
-        const std::uint32_t region = regions.region_of_face[HalfEdgeMesh::face_of(h)];
-        if (std::find(around.begin(), around.end(), region) == around.end()) around.add(region);
-      });
-      const std::optional<Vector3d> z_m = displacement_onto(regions, around, mesh_.vertex_m(v));
-      if (!z_m || z_m->norm() > kMaxFlattening * tolerance_m_ || z_m->norm() <= kSamePlane * size_m_)
-        continue;
-      moved_m[v] = z_m->norm();
-      mesh_.move_vertex(v, mesh_.vertex_m(v) + *z_m);
-    }
+    const std::size_t threads = threads_for(mesh_.vertex_count(), kMinPartVertices);
+    in_parallel(threads, threads, [&](std::size_t part) {
+      Planes planes;
+      const std::size_t count = mesh_.vertex_count();
+      for (auto v = static_cast<std::uint32_t>(part * count / threads); v < (part + 1) * count / threads; ++v)
+        moved_m[v] = flatten(v, regions, planes);
+    });
     for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
       for (const std::uint32_t v : mesh_.corners(f))
         faces_[f].high_m = std::max(faces_[f].high_m, moved_m[v]);
@@ -136,43 +142,57 @@ class Simplifier {
     }
   }
 
+  /// Moves one vertex. Returns its displacement [m].
+  double flatten(std::uint32_t v, const FlatRegions& regions, Planes& planes) {
+    if (mesh_.valence(v) == 0 || mesh_.valence(v) > kMaxStar) return 0.0;
+    StaticVector<std::uint32_t, kMaxStar> around;
+    mesh_.for_each_outgoing(v, [&](std::uint32_t h) {
+      const std::uint32_t region = regions.region_of_face[HalfEdgeMesh::face_of(h)];
+      if (std::find(around.begin(), around.end(), region) == around.end()) around.add(region);
+    });
+    const std::optional<Vector3d> z_m = displacement_onto(regions, around, mesh_.vertex_m(v), planes);
+    if (!z_m || z_m->norm() > kMaxFlattening * tolerance_m_ || z_m->norm() <= kSamePlane * size_m_)
+      return 0.0;
+    mesh_.move_vertex(v, mesh_.vertex_m(v) + *z_m);
+    return z_m->norm();
+  }
+
   /// Returns the displacement of a vertex onto the planes of the regions around it. It meets the planes of
   /// the two largest regions exactly, the third one if no other plane prevents it, and lies on or above the
   /// others.
   std::optional<Vector3d> displacement_onto(const FlatRegions& regions,
                                             const StaticVector<std::uint32_t, kMaxStar>& around,
-                                            const Vector3d& p_m) {
+                                            const Vector3d& p_m, Planes& problem) const {
     std::array<std::uint32_t, kMaxStar> order{};
     std::copy(around.begin(), around.end(), order.begin());
     std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(around.size()),
               [&](std::uint32_t a, std::uint32_t b) { return regions.areas_m2[a] > regions.areas_m2[b]; });
-    problem_.clear();
+    problem.clear();
     for (std::size_t i = 0; i < around.size(); ++i) {
       const FlatRegions::Plane& plane = regions.planes[order[i]];
-      problem_.add_unit(plane.normal, plane.offset_m - plane.normal.dot(p_m));
+      problem.add_unit(plane.normal, plane.offset_m - plane.normal.dot(p_m));
     }
-    const std::optional<Vector3d> z_m = displacement_onto_two_planes();
+    const std::optional<Vector3d> z_m = displacement_onto_two_planes(problem);
     if (z_m && z_m->norm() <= kMaxFlattening * tolerance_m_) return z_m;
-    if (problem_.solve(Vector3d::Zero(), kRounding * size_m_) != decltype(problem_)::Status::optimal)
-      return {};
-    return problem_.z();
+    if (problem.solve(Vector3d::Zero(), kRounding * size_m_) != Planes::Status::optimal) return {};
+    return problem.z();
   }
 
-  /// Solves for the planes in problem_: the first two determine a line (one plane alone: a point), and the
+  /// Solves for the planes in `problem`: the first two determine a line (one plane alone: a point), and the
   /// others limit the position on the line. Returns nothing if no point of the line is above all of them.
-  std::optional<Vector3d> displacement_onto_two_planes() const {
-    const Vector3d z_m = problem_.normal(0) * problem_.bound(0);
-    if (problem_.count() == 1) return z_m;
-    const Vector3d &a = problem_.normal(0), &b = problem_.normal(1);
+  std::optional<Vector3d> displacement_onto_two_planes(const Planes& problem) const {
+    const Vector3d z_m = problem.normal(0) * problem.bound(0);
+    if (problem.count() == 1) return z_m;
+    const Vector3d &a = problem.normal(0), &b = problem.normal(1);
     const Vector3d across = a.cross(b);
     const double sine = across.norm();
     if (sine < kMinSine) return {};
     const Vector3d direction = across / sine, in_plane = direction.cross(a);
-    const Vector3d on_line_m = z_m + in_plane * ((problem_.bound(1) - b.dot(z_m)) / b.dot(in_plane));
+    const Vector3d on_line_m = z_m + in_plane * ((problem.bound(1) - b.dot(z_m)) / b.dot(in_plane));
     double least_m = -std::numeric_limits<double>::infinity(), most_m = -least_m, wanted_m = 0.0;
-    for (std::size_t i = 2; i < problem_.count(); ++i) {
-      const double slope = problem_.normal(i).dot(direction);
-      const double missing_m = problem_.bound(i) - problem_.normal(i).dot(on_line_m);
+    for (std::size_t i = 2; i < problem.count(); ++i) {
+      const double slope = problem.normal(i).dot(direction);
+      const double missing_m = problem.bound(i) - problem.normal(i).dot(on_line_m);
       if (std::abs(slope) < kMinSine) {
         if (missing_m > kRounding * size_m_) return {};
         continue;
@@ -204,28 +224,96 @@ class Simplifier {
 
   /// Tries to collapse every edge once. The surroundings of a collapse stay as they are until the next call,
   /// so that the error spreads evenly. Returns the number of collapses.
+  ///
+  /// The parts of the surface are collapsed at the same time. A collapse reads and changes what belongs to
+  /// the vertices of its star, so it may take place in a part that contains all of them. What remains, along
+  /// the seams between the parts, follows when the parts are done.
   std::size_t collapse_edges() {
     ++sweep_;
+    assign_faces();
+    in_parallel(workers_.size() - 1, threads_for(mesh_.vertex_count(), kMinPartVertices),
+                [this](std::size_t part) { collapse_part(static_cast<Part>(part)); });
+    const auto seam = static_cast<Part>(workers_.size() - 1);
+    collapse_part(seam);
+    for (Part part = 0; part < seam; ++part)
+      for (const std::uint32_t h : workers_[part].deferred) try_to_collapse(h, seam);
     std::size_t collapses = 0;
-    for (std::uint32_t h = 0; h < mesh_.half_edge_count(); ++h)
-      if (try_to_collapse(h)) ++collapses;
+    for (const Worker& worker : workers_) collapses += worker.collapses;
     remaining_ -= collapses;
     return collapses;
   }
 
-  bool try_to_collapse(std::uint32_t h) {
-    if (mesh_.removed(HalfEdgeMesh::face_of(h))) return false;
+  void collapse_part(Part part) {
+    workers_[part].deferred.clear();
+    workers_[part].collapses = 0;
+    for (std::uint32_t h = 0; h < mesh_.half_edge_count(); ++h)
+      if (part_of_face_[HalfEdgeMesh::face_of(h)] == part) try_to_collapse(h, part);
+  }
+
+  /// Divides the vertices into parts of about equal size along the longest side of the mesh. The number of
+  /// parts depends on the mesh alone, and with it the result.
+  void divide() {
+    const std::size_t parts = std::clamp<std::size_t>(mesh_.vertex_count() / kMinPartVertices, 1, kMaxParts);
+    for (std::size_t part = 0; part <= parts; ++part) workers_.emplace_back(mesh_, faces_);
+    part_of_vertex_.assign(mesh_.vertex_count(), 0);
+    part_of_face_.assign(mesh_.face_count(), 0);
+    if (parts == 1) return;
+    Eigen::AlignedBox3d box;
+    for (std::uint32_t v = 0; v < mesh_.vertex_count(); ++v) box.extend(mesh_.vertex_m(v));
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    std::vector<double> along_m(mesh_.vertex_count());
+    for (std::uint32_t v = 0; v < mesh_.vertex_count(); ++v) along_m[v] = mesh_.vertex_m(v)[axis];
+    for (std::size_t part = 1; part < parts; ++part) {
+      std::vector<double> sorted_m = along_m;
+      const auto at = sorted_m.begin() + static_cast<std::ptrdiff_t>(part * sorted_m.size() / parts);
+      std::nth_element(sorted_m.begin(), at, sorted_m.end());
+      for (std::uint32_t v = 0; v < mesh_.vertex_count(); ++v)
+        if (along_m[v] >= *at) part_of_vertex_[v] = static_cast<Part>(part);
+    }
+  }
+
+  /// Assigns each face to the part of its corners, or to the seams if they are in several parts.
+  void assign_faces() {
+    const auto seam = static_cast<Part>(workers_.size() - 1);
+    if (seam == 1) return;
+    for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
+      if (mesh_.removed(f)) continue;
+      const auto& [a, b, c] = mesh_.corners(f);
+      const Part part = part_of_vertex_[a];
+      part_of_face_[f] = part_of_vertex_[b] == part && part_of_vertex_[c] == part ? part : seam;
+    }
+  }
+
+  /// True if the star of an edge lies in one part.
+  bool is_within(Part part, std::uint32_t u, std::uint32_t w) const {
+    if (workers_.size() == 2) return true;
+    bool within = true;
+    for (const std::uint32_t v : {u, w})
+      mesh_.for_each_outgoing(
+          v, [&](std::uint32_t h) { within = within && part_of_vertex_[mesh_.to(h)] == part; });
+    return within;
+  }
+
+  void try_to_collapse(std::uint32_t h, Part part) {
+    if (mesh_.removed(HalfEdgeMesh::face_of(h))) return;
     const std::uint32_t u = mesh_.from(h), w = mesh_.to(h);
-    if (u > w || locked_[u] == sweep_ || locked_[w] == sweep_) return false;
+    if (u > w || locked_[u] == sweep_ || locked_[w] == sweep_) return;
     const bool is_examined = examined_[h] > std::max(changed_[u], changed_[w]);
-    if (is_examined && needed_m_[h] > limits_.wanted_m) return false;
+    if (is_examined && needed_m_[h] > limits_.wanted_m) return;
+    Worker& worker = workers_[part];
+    if (part + 1U < workers_.size() && !is_within(part, u, w)) {
+      worker.deferred.push_back(h);
+      return;
+    }
     examined_[h] = sweep_;
     needed_m_[h] = std::numeric_limits<float>::infinity();
-    if (limits_.max_rise_m < tolerance_m_ && is_corner(u) && is_corner(w)) return false;
-    const std::optional<EdgeCollapse::Candidate> best = collapse_.find(h, limits_);
-    needed_m_[h] = static_cast<float>(collapse_.needed_m());
-    if (best) apply(h, *best);
-    return best.has_value();
+    if (limits_.max_rise_m < tolerance_m_ && is_corner(u) && is_corner(w)) return;
+    const std::optional<EdgeCollapse::Candidate> best = worker.collapse.find(h, limits_);
+    needed_m_[h] = static_cast<float>(worker.collapse.needed_m());
+    if (!best) return;
+    apply(h, *best, worker.collapse);
+    ++worker.collapses;
   }
 
   /// True if the faces around a vertex have three planes or more. Such a vertex is not removed from a surface
@@ -242,11 +330,11 @@ class Simplifier {
     return planes.full();
   }
 
-  void apply(std::uint32_t h, const EdgeCollapse::Candidate& candidate) {
+  void apply(std::uint32_t h, const EdgeCollapse::Candidate& candidate, const EdgeCollapse& collapse) {
     const std::uint32_t u = mesh_.from(h), w = mesh_.to(h);
-    if (!collapse_.is_nearer_to_u(candidate)) source_[u] = source_[w];
+    if (!collapse.is_nearer_to_u(candidate)) source_[u] = source_[w];
     mesh_.collapse(h, candidate.p_m);
-    collapse_.for_each_remaining_face([&](std::uint32_t f) {
+    collapse.for_each_remaining_face([&](std::uint32_t f) {
       faces_[f].high_m = candidate.high_m;
       faces_[f].low_m = candidate.low_m;
       update_face(f);
@@ -269,22 +357,10 @@ class Simplifier {
   std::vector<std::uint32_t> source_;
   int sweep_ = 0;
   std::size_t remaining_ = 0;
-  EdgeCollapse collapse_{mesh_, faces_};
-  LeastDistance<3, kMaxStar> problem_;
+  std::vector<Worker> workers_;       ///< one for each part, and the last one for the seams
+  std::vector<Part> part_of_vertex_;  ///< does not change
+  std::vector<Part> part_of_face_;    ///< at the begin of a sweep
 };
-
-/// Returns true if two triangles of a closed mesh intersect beyond a common vertex or edge.
-bool intersects_itself(const TriangleMesh& mesh) {
-  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-  std::vector<Kernel::Point_3> points;
-  points.reserve(mesh.vertices_m.size());
-  for (const Vector3d& p : mesh.vertices_m) points.emplace_back(p.x(), p.y(), p.z());
-  CGAL::Surface_mesh<Kernel::Point_3> surface;
-  for (const auto& p : points) surface.add_vertex(p);
-  using Vertex = CGAL::Surface_mesh<Kernel::Point_3>::Vertex_index;
-  for (const auto& [a, b, c] : mesh.triangles) surface.add_face(Vertex(a), Vertex(b), Vertex(c));
-  return CGAL::Polygon_mesh_processing::does_self_intersect(surface);
-}
 
 SimplifiedMesh unchanged(TriangleMesh mesh) {
   SimplifiedMesh result;

@@ -9,6 +9,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/in_parallel.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -21,6 +23,8 @@ constexpr double kWorthwhile = 0.9;
 /// Other splits than across the longest axis are tried for at most this number of triangles. More triangles
 /// rarely lie in one sheet.
 constexpr std::uint32_t kMaxCompared = 4096;
+/// Fewer triangles take less time than the start of a thread is worth.
+constexpr std::size_t kLeastTrianglesPerThread = 25'000;
 /// Traversals enlarge boxes by about this fraction of the mesh's extent.
 constexpr double kEnlargement = 1e-4;
 
@@ -152,6 +156,7 @@ class Builder {
   }
   Fitted fit(Range range) const;
   Halves halve(Range range, const Fitted& box, int axis);
+  Halves best_halves(const Branch& branch);
   double overlap_cost(const Halves& halves) const;
   void split();
 
@@ -207,33 +212,46 @@ Fitted Builder::fit(Range range) const {
   return box;
 }
 
-/// Splits until each leaf has at most eight triangles: across the longest axis, or across the second one if
-/// that gives thinner boxes.
+/// Splits until each leaf has at most eight triangles. The ranges of one level do not overlap, so that all
+/// processors can split them; the branches are the same and in the same order as with one.
 void Builder::split() {
   const auto add = [&](const Fitted& box, Range range) {
     branches_.push_back({box, range.begin, range.end, 0, 0});
     return static_cast<std::uint32_t>(branches_.size() - 1);
   };
+  const std::size_t threads = threads_for(order_.size(), kLeastTrianglesPerThread);
   const Range all = {0, static_cast<std::uint32_t>(order_.size())};
   add(fit(all), all);
-  std::vector<std::uint32_t> order_across_longest;
-  for (std::uint32_t at = 0; at < branches_.size(); ++at) {
-    const auto [box, begin, end, left, right] = branches_[at];
-    if (end - begin <= kWidth) continue;
-    Halves halves = halve({begin, end}, box, 0);
-    if (end - begin <= kMaxCompared) {
-      order_across_longest.assign(order_.begin() + begin, order_.begin() + end);
-      const Halves across_second = halve({begin, end}, box, 1);
-      if (overlap_cost(across_second) < kWorthwhile * overlap_cost(halves))
-        halves = across_second;
-      else
-        std::copy(order_across_longest.begin(), order_across_longest.end(), order_.begin() + begin);
+  std::vector<Halves> halves;
+  for (std::size_t level = 0; level < branches_.size();) {
+    const std::size_t end = branches_.size();
+    const auto is_divided = [](const Branch& branch) { return branch.end - branch.begin > kWidth; };
+    halves.resize(end - level);
+    in_parallel(end - level, threads, [&](std::size_t i) {
+      if (is_divided(branches_[level + i])) halves[i] = best_halves(branches_[level + i]);
+    });
+    for (std::size_t at = level; at < end; ++at) {
+      if (!is_divided(branches_[at])) continue;
+      const Halves& parts = halves[at - level];
+      const std::uint32_t a = add(parts.below, {parts.range.begin, parts.middle}),
+                          b = add(parts.above, {parts.middle, parts.range.end});
+      branches_[at].left = a;
+      branches_[at].right = b;
     }
-    const std::uint32_t a = add(halves.below, {begin, halves.middle}),
-                        b = add(halves.above, {halves.middle, end});
-    branches_[at].left = a;
-    branches_[at].right = b;
+    level = end;
   }
+}
+
+/// Divides across the longest axis, or across the second one if that gives thinner boxes.
+Halves Builder::best_halves(const Branch& branch) {
+  const Range range = {branch.begin, branch.end};
+  const Halves across_longest = halve(range, branch.box, 0);
+  if (range.end - range.begin > kMaxCompared) return across_longest;
+  const std::vector<std::uint32_t> order(order_.begin() + range.begin, order_.begin() + range.end);
+  const Halves across_second = halve(range, branch.box, 1);
+  if (overlap_cost(across_second) < kWorthwhile * overlap_cost(across_longest)) return across_second;
+  std::copy(order.begin(), order.end(), order_.begin() + range.begin);
+  return across_longest;
 }
 
 /// Divides the triangles of a range near their mean along an axis of their box, and reorders them.
@@ -388,7 +406,8 @@ TriangleBvh::TriangleBvh(const MeshSurface& surface) {
   const std::vector<Branch>& branches = builder.branches();
   extent_m_ = static_cast<float>(builder.extent_m());
   const double rounding_m = kRounding * builder.extent_m();
-  std::vector<std::uint32_t> tops = {0};  // branch of each node
+  std::vector<std::uint32_t> tops = {0};      // branch of each node
+  std::vector<std::uint32_t> branch_of_leaf;  // branch of each leaf
   for (std::size_t n = 0; n < tops.size(); ++n) {
     const std::vector<std::uint32_t> under = opened(branches, tops[n]);
     std::array<Box, kWidth> boxes;
@@ -398,9 +417,9 @@ TriangleBvh::TriangleBvh(const MeshSurface& surface) {
       boxes[i] = single(branch.box, rounding_m);
       boxes[i].features = builder.features(branch);
       if (branch.left == 0) {
-        boxes[i].child = static_cast<std::uint32_t>(leaves_.size());
+        boxes[i].child = static_cast<std::uint32_t>(branch_of_leaf.size());
         boxes[i].count = static_cast<std::int16_t>(branch.end - branch.begin);
-        leaves_.push_back(builder.leaf(branch));
+        branch_of_leaf.push_back(under[i]);
       } else {
         boxes[i].child = static_cast<std::uint32_t>(tops.size());
         tops.push_back(under[i]);
@@ -409,6 +428,9 @@ TriangleBvh::TriangleBvh(const MeshSurface& surface) {
     nodes_.push_back(side_by_side(boxes.data()));
     boxes_.insert(boxes_.end(), boxes.begin(), boxes.end());
   }
+  leaves_.resize(branch_of_leaf.size());
+  in_parallel(leaves_.size(), threads_for(surface.triangles().size(), kLeastTrianglesPerThread),
+              [&](std::size_t i) { leaves_[i] = builder.leaf(branches[branch_of_leaf[i]]); });
 }
 
 std::size_t TriangleBvh::bytes() const noexcept {

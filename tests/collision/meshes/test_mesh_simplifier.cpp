@@ -125,6 +125,31 @@ TEST_CASE("the simplified surface encloses the solid within the stated distance"
   }
 }
 
+TEST_CASE("a surface that is simplified in parts, on several processors, is as good as one in one piece",
+          "[mesh_simplifier]") {
+  for (const TriangleMesh& cube :
+       {make_mesh({"cube", 400'000}), rounded(rotated(make_mesh({"cube", 400'000})))})
+    CHECK(simplify_enclosing(cube, kTolerance_m).mesh.triangles.size() == 12);
+  for (const std::string kind : {"hole", "hare"}) {
+    INFO(kind);
+    const TriangleMesh fine = rounded(rotated(make_mesh({kind, 250'000})));
+    const SimplifiedMesh simple = simplify_enclosing(fine, kTolerance_m);
+    CHECK(simple.mesh.triangles.size() < fine.triangles.size());
+    CHECK(simple.distance_m <= kTolerance_m);
+    const Surface surface = surface_of(simple.mesh);
+    REQUIRE(surface.number_of_faces() == simple.mesh.triangles.size());
+    CHECK(CGAL::is_closed(surface));
+    CHECK_FALSE(CGAL::Polygon_mesh_processing::does_self_intersect(surface));
+    const Comparison measured = compare(fine, simple.mesh);
+    CHECK(measured.farthest_m <= simple.distance_m + 1e-12);
+    CHECK(measured.deepest_m < 1e-9);
+    const SimplifiedMesh again = simplify_enclosing(fine, kTolerance_m);
+    CHECK(again.mesh.triangles == simple.mesh.triangles);
+    CHECK(again.mesh.vertices_m == simple.mesh.vertices_m);
+    CHECK(again.source_vertex == simple.source_vertex);
+  }
+}
+
 TEST_CASE("a larger tolerance leaves fewer triangles", "[mesh_simplifier]") {
   const TriangleMesh ball = make_mesh({"sphere", 20000});
   std::size_t last = ball.triangles.size() + 1;
