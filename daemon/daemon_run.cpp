@@ -283,7 +283,7 @@ void open_other_process(Hand& hand, Clock& clock, TimePoint end) {
   hand.runtime.set_arming_obstacle(kTestRuns);
   std::string obstacle;
   if (needs_first_test(config, nullptr, tested))
-    obstacle = run_first_test(config, *hand.device.link, nullptr, clock, stop, waiting, tested);
+    obstacle = run_first_test(config, *hand.device.link, nullptr, clock, stop, waiting, tested).value_or("");
   open_simulated(hand);
   if (needs_direction_test(config, nullptr, tested))
     obstacle =

@@ -14,8 +14,8 @@ namespace wrenchd {
 namespace {
 
 /// Returns why the opened device must not be armed, with the remedy; "" if the device may be armed. Tests a
-/// device that needs its first test, and opens it again; returns nothing if the device cannot be opened
-/// again.
+/// device that needs its first test, and opens it again; returns nothing if `stop` ended the test, or if the
+/// device cannot be opened again.
 std::optional<std::string> find_obstacle(Runtime& runtime, ReconnectingLink& link, WallClock& clock,
                                          const StopCondition& stop, const ReportWaiting& waiting) {
   const UsbDevice device = link.device().value();
@@ -23,7 +23,8 @@ std::optional<std::string> find_obstacle(Runtime& runtime, ReconnectingLink& lin
   const TestedDevices tested;
   if (!not_calibrated.empty() || !needs_first_test(runtime.config(), &device, tested)) return not_calibrated;
   runtime.close();
-  const std::string obstacle = run_first_test(runtime.config(), link, &device, clock, stop, waiting, tested);
+  std::optional<std::string> obstacle =
+      run_first_test(runtime.config(), link, &device, clock, stop, waiting, tested);
   try {
     runtime.open();
   } catch (const std::runtime_error&) {

@@ -163,9 +163,9 @@ bool needs_direction_test(const RunConfig& config, const UsbDevice* device, cons
   return !has_open_layout(config.profile) && needs_test(config, device, tested);
 }
 
-std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbDevice* device, Clock& clock,
-                           const StopCondition& stop, const ReportWaiting& waiting,
-                           const TestedDevices& tested) {
+std::optional<std::string> run_first_test(const RunConfig& config, ReportLink& link, const UsbDevice* device,
+                                          Clock& clock, const StopCondition& stop,
+                                          const ReportWaiting& waiting, const TestedDevices& tested) {
   announce(config.profile, waiting);
   const ConformanceUser user = {[](const std::string&) {}, stop};
   const ConformanceOptions options = {Duration{0}, true, true};
@@ -174,6 +174,8 @@ std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbD
         test_twice([&] { return check_conformance(config.profile, link, device, clock, user, options); });
     return conclude(config, device, tested, result,
                     "correct its firmware or its profile: wrenchctl conform prints the result of every rule");
+  } catch (const SessionCancelled&) {
+    return {};
   } catch (const std::runtime_error& error) {
     return did_not_end(error);
   }

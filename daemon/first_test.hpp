@@ -33,12 +33,12 @@ inline constexpr const char* kTestRuns = "its first test runs; try again in some
 /// test runs a second time, because a delay of this machine can spoil a test; a rule that fails in the first
 /// test and does not pass in the second is broken. Logs each broken rule, and each rule that the test could
 /// not judge. Stores in `tested` that a device passed if the test saw the direction of its force and torque.
-/// Returns why the device must not be armed, with the remedy; "" if the device may be armed. Precondition:
-/// the link is closed; it is closed afterwards. An error of the device is returned, not thrown. Not RT-safe:
-/// takes seconds.
-std::string run_first_test(const RunConfig& config, ReportLink& link, const UsbDevice* device, Clock& clock,
-                           const StopCondition& stop, const ReportWaiting& waiting,
-                           const TestedDevices& tested);
+/// Returns why the device must not be armed, with the remedy; "" if the device may be armed; nothing if
+/// `stop` ended the test. Precondition: the link is closed; it is closed afterwards. An error of the device
+/// is returned, not thrown. Not RT-safe: takes seconds.
+std::optional<std::string> run_first_test(const RunConfig& config, ReportLink& link, const UsbDevice* device,
+                                          Clock& clock, const StopCondition& stop,
+                                          const ReportWaiting& waiting, const TestedDevices& tested);
 
 /// Tests a device of any other report layout: check_directions(), with the same second test, log and store as
 /// run_first_test(). Waits without limit for a person to home a device that is not homed. Returns nothing if

@@ -38,8 +38,8 @@ constexpr std::array kPasses = {1e-4, 3e-3, 3e-2, 0.1, 0.3, 1.0};
 /// A pass repeats its sweeps until a sweep removes less than this fraction of the vertices.
 constexpr double kMinProgress = 0.002;
 constexpr int kMaxSweeps = 60;
-/// The surface is divided into at most kMaxParts parts of at least kMinPartVertices vertices.
-constexpr std::size_t kMaxParts = 8, kMinPartVertices = 50'000;
+/// The surface is divided into at most kMaxSurfaceParts parts of at least kMinPartVertices vertices.
+constexpr std::size_t kMaxSurfaceParts = 8, kMinPartVertices = 50'000;
 /// Number of attempts with a smaller tolerance if the result intersects itself, and the factor between them.
 constexpr int kAttempts = 3;
 constexpr double kSmallerTolerance = 0.1;
@@ -253,7 +253,8 @@ class Simplifier {
   /// Divides the vertices into parts of about equal size along the longest side of the mesh. The number of
   /// parts depends on the mesh alone, and with it the result.
   void divide() {
-    const std::size_t parts = std::clamp<std::size_t>(mesh_.vertex_count() / kMinPartVertices, 1, kMaxParts);
+    const std::size_t parts =
+        std::clamp<std::size_t>(mesh_.vertex_count() / kMinPartVertices, 1, kMaxSurfaceParts);
     for (std::size_t part = 0; part <= parts; ++part) workers_.emplace_back(mesh_, faces_);
     part_of_vertex_.assign(mesh_.vertex_count(), 0);
     part_of_face_.assign(mesh_.face_count(), 0);

@@ -63,9 +63,9 @@ struct Bench {
     config.simulated = false;
     usb.serial = "A1";
   }
-  std::string run() {
+  std::optional<std::string> run(const StopCondition& stop = [] { return false; }) {
     return run_first_test(
-        config, link, &usb, clock, [] { return false; }, [](const std::string&) {}, tested);
+        config, link, &usb, clock, stop, [](const std::string&) {}, tested);
   }
   bool needed() const { return needs_first_test(config, &usb, tested); }
 
@@ -81,7 +81,7 @@ struct Bench {
 void check_rejected(const std::string& rule, FirmwareMistakes mistakes) {
   INFO(rule);
   Bench bench(std::move(mistakes));
-  const std::string obstacle = bench.run();
+  const std::string obstacle = bench.run().value();
   CHECK_THAT(obstacle, Contains(rule));
   CHECK_THAT(obstacle, Contains("correct its firmware or its profile"));
   CHECK(bench.needed());
@@ -138,6 +138,12 @@ TEST_CASE("a device whose force cannot be seen may be armed, and is tested again
   CHECK(bench.needed());
 }
 
+TEST_CASE("a signal ends the first test without a result", "[first_test]") {
+  Bench bench;
+  CHECK_FALSE(bench.run([&] { return seconds(bench.clock.now().time_since_epoch()) > 0.4; }));
+  CHECK(bench.needed());
+}
+
 TEST_CASE("a device without valid reports fails its first test", "[first_test]") {
   FirmwareMistakes mistakes;
   mistakes.report = [](ReportBytes& r) { r.assign(3, 0); };
@@ -175,7 +181,7 @@ TEST_CASE("a rule that failed once must pass in the second test, not merely esca
     constexpr int kOfFirstTest = 8'000;  // periods of the motor context, 16 a millisecond
     for (std::int32_t& f : w.force_uN) f = pulses < kOfFirstTest ? -f : 0;
   }));
-  CHECK_THAT(bench.run(), Contains("force_direction"));
+  CHECK_THAT(bench.run().value(), Contains("force_direction"));
   CHECK(pulses > 8'000);
   CHECK(bench.needed());
 }
