@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "collision/surface_sector.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -251,6 +253,9 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
                        face_body.corner_m(triangle, 2), face_body.planes()[triangle].normal,
                        pass.closes ? feature_margin_m_ : sweep_tolerance::kTouch * clearance_m_))
     return {};
+  if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < sweep_tolerance::kAnySlope &&
+      is_behind_rim(face_body, triangle, side, pass.p))
+    return {};
   const auto ring = vertex_body.ring_of(vertex);
   double rise = 0.0;  // sum of the slopes to the neighbours
   for (const std::uint32_t neighbour : ring) {
@@ -397,6 +402,14 @@ bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, d
   const auto falls_away = [&](const Vector3d& height_of, double side) {
     return side * n.dot(height_of) >= -slope_tolerance_ * height_of.norm();
   };
+  if (slope_tolerance_ < sweep_tolerance::kAnySlope) {
+    const MeshSurface::Edge &ea = tool.convex_edges()[pass.edge_a], &eb = surface.convex_edges()[pass.edge_b];
+    if (surface.kind() == MeshSurface::Kind::surface && is_behind_end(surface, eb, n, pass.p, clearance_m_))
+      return false;
+    if (tool.kind() == MeshSurface::Kind::surface &&
+        is_behind_end(tool, ea, -(view.X_OT_end.R.transpose() * n), point_on(tool, ea, x), clearance_m_))
+      return false;
+  }
   for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
     for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k)
       if (!falls_away(surface.corner_m(t, k) - pass.b0, -1.0)) return false;

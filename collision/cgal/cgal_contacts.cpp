@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/surface_sector.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -237,6 +239,9 @@ std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass_on_side(
   if (!exact::projects_inside(pass.p_m, triangle_of(face_body, triangle), face_body.planes()[triangle].normal,
                               pass.closes ? feature_margin_m_ : kTouch * clearance_m_))
     return {};
+  if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < kAnySlope &&
+      is_behind_rim(face_body, triangle, side, pass.p_m))
+    return {};
   const auto ring = vertex_body.ring_of(vertex);
   double rise = 0.0;  // sum of the slopes to the neighbours
   for (const std::uint32_t neighbour : ring) {
@@ -337,8 +342,17 @@ bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fractio
   const Vector3d N = at.da.cross(at.db), w = at.b0 - at.a0;
   const double NN = N.squaredNorm();
   if (!(NN > 0.0)) return false;
-  if (point_O_m != nullptr) *point_O_m = at.b0 + (w.cross(at.da).dot(N) / NN) * at.db;
-  const Vector3d n = N * (sign / std::sqrt(NN));
+  const Vector3d p_O_m = at.b0 + (w.cross(at.da).dot(N) / NN) * at.db, n = N * (sign / std::sqrt(NN));
+  if (point_O_m != nullptr) *point_O_m = p_O_m;
+  if (slope_tolerance_ < kAnySlope) {
+    const MeshSurface::Edge &ea = tool.convex_edges()[pass.edge_a], &eb = surface.convex_edges()[pass.edge_b];
+    if (surface.kind() == MeshSurface::Kind::surface && is_behind_end(surface, eb, n, p_O_m, clearance_m_))
+      return false;
+    const double x = w.cross(at.db).dot(N) / NN;
+    if (tool.kind() == MeshSurface::Kind::surface &&
+        is_behind_end(tool, ea, -(pass.view.X_OT_end.R.transpose() * n), point_on(tool, ea, x), clearance_m_))
+      return false;
+  }
   const auto falls_away = [&](const Vector3d& from_edge, double side) {
     return exact::rises(side * n, from_edge, slope_tolerance_ * from_edge.norm());
   };

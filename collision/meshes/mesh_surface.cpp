@@ -101,11 +101,10 @@ std::vector<MeshSurface::CrowdedEdge> MeshSurface::find_neighbours() {
   return crowded;
 }
 
-/// Returns true if the neighbour across a side traverses that side in the opposite direction, as in a
-/// consistently oriented mesh.
-bool MeshSurface::is_wound_alike(TriangleSide side, std::uint32_t other) const noexcept {
-  const Corners& corners = mesh_.triangles[side.triangle];
-  const std::uint32_t from = corners[side.side], to = corners[static_cast<std::size_t>(next(side.side))];
+bool MeshSurface::is_wound_alike(std::uint32_t triangle, std::size_t side,
+                                 std::uint32_t other) const noexcept {
+  const Corners& corners = mesh_.triangles[triangle];
+  const std::uint32_t from = corners[side], to = corners[side == 2 ? 0 : side + 1];
   for (int k = 0; k < 3; ++k)
     if (mesh_.triangles[other][static_cast<std::size_t>(k)] == from)
       return mesh_.triangles[other][static_cast<std::size_t>(next(k))] != to;

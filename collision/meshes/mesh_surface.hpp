@@ -82,6 +82,14 @@ class MeshSurface {
     return edge.sides[0] * planes_[edge.triangles[0]].normal +
            edge.sides[1] * planes_[edge.triangles[1]].normal;
   }
+  /// Returns the triangle across the side from corner `side` to the next corner; kNone at a border and where
+  /// more than two faces meet. RT-safe.
+  std::uint32_t neighbour(std::uint32_t triangle, std::size_t side) const noexcept {
+    return neighbours_[triangle][side];
+  }
+  /// Returns true if the neighbour across a side traverses that side in the opposite direction, as in a
+  /// consistently oriented mesh. RT-safe.
+  bool is_wound_alike(std::uint32_t triangle, std::size_t side, std::uint32_t other) const noexcept;
   /// Returns the region of a triangle. Adjacent coplanar triangles have the same region. RT-safe.
   std::uint32_t planar_region(std::uint32_t triangle) const noexcept { return planar_region_[triangle]; }
 
@@ -109,7 +117,9 @@ class MeshSurface {
   void find_planes();
   void find_convex_edges(const std::vector<CrowdedEdge>& crowded);
   void find_convex_vertices();
-  bool is_wound_alike(TriangleSide side, std::uint32_t other) const noexcept;
+  bool is_wound_alike(TriangleSide side, std::uint32_t other) const noexcept {
+    return is_wound_alike(side.triangle, side.side, other);
+  }
   double height_beyond_m(TriangleSide side, std::uint32_t other) const noexcept;
   void add_edge(TriangleSide side, std::uint32_t other, std::array<std::int32_t, 2> sides);
   void add_edge_of_surface(TriangleSide side, std::uint32_t other);

@@ -139,7 +139,7 @@ class Conformance {
     results_.push_back(
         {std::move(rule), passed ? Judgement::pass : Judgement::fail, std::move(seen), std::move(section)});
   }
-  void add(std::string rule, Finding finding, std::string section) {
+  void add(std::string rule, RuleFinding finding, std::string section) {
     results_.push_back({std::move(rule), finding.judgement, std::move(finding.seen), std::move(section)});
   }
   void skip(std::string rule, std::string why, std::string section) {

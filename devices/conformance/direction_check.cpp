@@ -40,11 +40,11 @@ class SequenceCount {
     acknowledged_ = sample.acknowledged;
   }
 
-  Finding sequence() const {
+  RuleFinding sequence() const {
     return {repeated_ == 0 && missing_ <= reports_ / 20 ? Judgement::pass : Judgement::fail,
             fmt::format("{} reports: {} repeated or backwards, {} missing", reports_, repeated_, missing_)};
   }
-  Finding acknowledged(double report_rate_Hz) {
+  RuleFinding acknowledged(double report_rate_Hz) {
     if (latencies_s_.size() < sent_ / 4)
       return {Judgement::fail,
               fmt::format("{} commands sent, {} changes of `acknowledged`", sent_, latencies_s_.size())};
@@ -129,7 +129,7 @@ class DirectionCheck {
   }
 
  private:
-  void add(std::string rule, Finding finding) {
+  void add(std::string rule, RuleFinding finding) {
     results_.push_back({std::move(rule), finding.judgement, std::move(finding.seen), kUnitsSection});
   }
 

@@ -74,16 +74,16 @@ std::string DirectionPulses::Response::text(int axis) const {
   return fmt::format("{}: {:+.3f} {}", name_of(axis), 1e3 * mean[axis], force ? "mm" : "mrad");
 }
 
-Finding DirectionPulses::judge_force(double pulse_N, DofMask axes, double least_m) {
+RuleFinding DirectionPulses::judge_force(double pulse_N, DofMask axes, double least_m) {
   return judge(true, pulse_N, axes & kLinearDofs, least_m);
 }
 
-Finding DirectionPulses::judge_torque(double pulse_Nm, DofMask axes, double least_rad) {
+RuleFinding DirectionPulses::judge_torque(double pulse_Nm, DofMask axes, double least_rad) {
   return judge(false, pulse_Nm, static_cast<DofMask>((axes & kAngularDofs) >> 3), least_rad);
 }
 
 /// axes: bits 0 to 2 for x y z.
-Finding DirectionPulses::judge(bool force, double size, DofMask axes, double least) {
+RuleFinding DirectionPulses::judge(bool force, double size, DofMask axes, double least) {
   Responses responses;
   for (int axis = 0; axis < 3; ++axis)
     if (contains(axes, axis)) responses[static_cast<std::size_t>(axis)] = apply(force, axis, size, least);

@@ -60,9 +60,9 @@ class DirectionPulses {
   /// Judges the force along `axes`, the linear degrees of freedom that are driven and sensed. least_m: least
   /// displacement that is not a step of the encoders. Throws as PulsedDevice::drive() does, and
   /// std::runtime_error if the device sends no valid sample.
-  Finding judge_force(double pulse_N, DofMask axes, double least_m);
+  RuleFinding judge_force(double pulse_N, DofMask axes, double least_m);
   /// The same for the torque about `axes`, the angular degrees of freedom.
-  Finding judge_torque(double pulse_Nm, DofMask axes, double least_rad);
+  RuleFinding judge_torque(double pulse_Nm, DofMask axes, double least_rad);
 
   /// Samples during all pulses.
   std::span<const MotionSample> motion() const noexcept { return motion_; }
@@ -84,7 +84,7 @@ class DirectionPulses {
   };
   using Responses = std::array<Response, 3>;
 
-  Finding judge(bool force, double size, DofMask axes, double least);
+  RuleFinding judge(bool force, double size, DofMask axes, double least);
   Response apply(bool force, int axis, double size, double least);
   Vector3d displacement(bool force, const Wrench& F);
   /// Drives the device and keeps its last pose in X_BH_.

@@ -132,7 +132,7 @@ Travel least_travel_by_pulses(double step_m, double step_rad) noexcept {
           std::max(kTravelByPulses.rad, kTravelPerStep * step_rad)};
 }
 
-Finding judge_quaternion_order(const VelocityComparison& seen) {
+RuleFinding judge_quaternion_order(const VelocityComparison& seen) {
   const double stated = seen.rotation_correlation, swapped = seen.w_first_correlation;
   if (seen.turned_rad < kMinTurn_rad) return {Judgement::not_judged, "the handle was not turned"};
   if (stated == 0.0 && swapped == 0.0) return {Judgement::not_judged, "the reported angular velocity is 0"};
@@ -142,7 +142,7 @@ Finding judge_quaternion_order(const VelocityComparison& seen) {
   return {Judgement::not_judged, "the angular velocity agrees with no order"};
 }
 
-Finding judge_velocity(const VelocityComparison& seen, DofMask axes, const Travel& enough) {
+RuleFinding judge_velocity(const VelocityComparison& seen, DofMask axes, const Travel& enough) {
   std::string wrong, right, unmoved;
   for (std::size_t i = 0; i < 6; ++i) {
     if ((axes >> i & 1U) == 0) continue;

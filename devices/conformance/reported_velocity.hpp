@@ -62,10 +62,10 @@ Travel least_travel_by_pulses(double step_m, double step_rad) noexcept;
 inline constexpr double kMinTurn_rad = 0.2;
 
 /// Judges the order of the quaternion by the reported angular velocity. Not RT-safe.
-Finding judge_quaternion_order(const VelocityComparison& seen);
+RuleFinding judge_quaternion_order(const VelocityComparison& seen);
 
 /// Judges the sign, scale and axis of the reported velocity along these degrees of freedom, all linear or all
 /// angular. Not RT-safe.
-Finding judge_velocity(const VelocityComparison& seen, DofMask axes, const Travel& enough);
+RuleFinding judge_velocity(const VelocityComparison& seen, DofMask axes, const Travel& enough);
 
 }  // namespace wrenchd

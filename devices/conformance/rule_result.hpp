@@ -13,7 +13,7 @@ enum class Judgement : std::uint8_t {
 };
 
 /// What a check of one rule has found.
-struct Finding {
+struct RuleFinding {
   Judgement judgement = Judgement::not_judged;
   std::string seen;  ///< what was observed, with numbers
 };

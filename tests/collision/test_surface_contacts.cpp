@@ -89,6 +89,46 @@ TriangleMesh tray() {
   return mesh;
 }
 
+/// A block of 0.14 m x 0.14 m x 0.04 m with its top in z = 0, and n x n square pockets in it, 0.01 m deep.
+TriangleMesh block_with_pockets(std::uint32_t n) {
+  const std::uint32_t cells = 2 * n + 1, points = cells + 1;
+  constexpr double kSize_m = 0.14;
+  TriangleMesh mesh;
+  for (const double z_m : {0.0, -0.04})
+    for (std::uint32_t i = 0; i < points; ++i)
+      for (std::uint32_t j = 0; j < points; ++j)
+        mesh.vertices_m.emplace_back(kSize_m * (i / static_cast<double>(cells) - 0.5),
+                                     kSize_m * (j / static_cast<double>(cells) - 0.5), z_m);
+  const auto top = [&](std::uint32_t i, std::uint32_t j) { return i * points + j; };
+  const auto bottom = [&](std::uint32_t i, std::uint32_t j) { return points * points + top(i, j); };
+  using Quad = std::array<std::uint32_t, 4>;
+  const auto add = [&](const Quad& q) {
+    mesh.triangles.push_back({q[0], q[1], q[2]});
+    mesh.triangles.push_back({q[0], q[2], q[3]});
+  };
+  for (std::uint32_t i = 0; i < cells; ++i)
+    for (std::uint32_t j = 0; j < cells; ++j) {
+      add({bottom(i, j), bottom(i, j + 1), bottom(i + 1, j + 1), bottom(i + 1, j)});
+      const Quad rim = {top(i, j), top(i + 1, j), top(i + 1, j + 1), top(i, j + 1)};
+      if (i % 2 == 0 || j % 2 == 0) {
+        add(rim);
+        continue;
+      }
+      const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
+      const Quad floor = {first, first + 1, first + 2, first + 3};
+      for (const std::uint32_t v : rim) mesh.vertices_m.push_back(mesh.vertices_m[v] - Vector3d(0, 0, 0.01));
+      add(floor);
+      for (std::size_t k = 0; k < 4; ++k) add({rim[k], rim[(k + 1) % 4], floor[(k + 1) % 4], floor[k]});
+    }
+  for (std::uint32_t i = 0; i < cells; ++i) {
+    add({bottom(i, 0), bottom(i + 1, 0), top(i + 1, 0), top(i, 0)});
+    add({bottom(i + 1, cells), bottom(i, cells), top(i, cells), top(i + 1, cells)});
+    add({bottom(0, i + 1), bottom(0, i), top(0, i), top(0, i + 1)});
+    add({bottom(cells, i), bottom(cells, i + 1), top(cells, i + 1), top(cells, i)});
+  }
+  return mesh;
+}
+
 Scene against(TriangleMesh tool, TriangleMesh obstacle, BodyKind kind) {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back({"obstacle", MeshBvh(std::move(obstacle), kind), Pose{}});
@@ -161,6 +201,20 @@ TEST_CASE("a closed mesh as a surface holds a tool as the solid does", "[surface
                          << " ticks in contact");
     CHECK(d.quantile(0.5) < 1e-6);
     CHECK(d.quantile(0.999) < 0.01);
+  }
+}
+
+TEST_CASE("the far sides of the walls of pockets do not hold a tool that slides and turns over their rims",
+          "[surface_contacts]") {
+  const TriangleMesh cube = make_mesh({"cube", 12});
+  const ManipulationCase handling = {"", {}, {}, HandMotion::slide, {0, 0, 0.03}};
+  for (const std::uint32_t n : {2, 3, 4, 6}) {
+    Difference d =
+        compare(against(cube, block_with_pockets(n), BodyKind::solid),
+                against(cube, block_with_pockets(n), BodyKind::surface), handling, case_count(2000));
+    INFO(n * n << " pockets: p99.9 " << d.quantile(0.999) << ", largest " << d.quantile(1.0) << ", "
+               << d.contacts << " ticks in contact");
+    CHECK(d.quantile(0.999) < 1e-9);
   }
 }
 

@@ -42,11 +42,11 @@ struct FreeBody final : PulsedDevice {
   double t_s_ = 0.0;
 };
 
-Finding force_of(FreeBody body, DofMask axes = kLinearDofs) {
+RuleFinding force_of(FreeBody body, DofMask axes = kLinearDofs) {
   return DirectionPulses(body, kBriefPulses).judge_force(0.25, axes, 1e-6);
 }
 
-Finding torque_of(FreeBody body) {
+RuleFinding torque_of(FreeBody body) {
   return DirectionPulses(body, kBriefPulses).judge_torque(0.01, kAngularDofs, 1e-6);
 }
 
@@ -79,7 +79,7 @@ TEST_CASE("pulses show an inverted axis, and name it", "[direction_pulses]") {
     FreeBody body;
     body.mistake(axis, axis) = -1.0;
     const std::string inverted = std::string(kAxisNames[axis]) + ": -";
-    for (const Finding& finding : {force_of(body), torque_of(body)}) {
+    for (const RuleFinding& finding : {force_of(body), torque_of(body)}) {
       CHECK(finding.judgement == Judgement::fail);
       CHECK_THAT(finding.seen, Contains(inverted) && Contains("the sign is inverted"));
     }

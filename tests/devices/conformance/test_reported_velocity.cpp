@@ -36,10 +36,10 @@ Samples changed(const std::function<void(MotionSample&)>& change) {
 
 constexpr Travel kEnough = {0.01, 0.1};
 
-Finding linear_of(const Samples& samples) {
+RuleFinding linear_of(const Samples& samples) {
   return judge_velocity(compare_velocities(samples), kLinearDofs, kEnough);
 }
-Finding angular_of(const Samples& samples) {
+RuleFinding angular_of(const Samples& samples) {
   return judge_velocity(compare_velocities(samples), kAngularDofs, kEnough);
 }
 
@@ -90,7 +90,7 @@ TEST_CASE("the order of the quaternion shows in the angular velocity", "[reporte
     const Quaterniond q = s.X_BH.rotation;
     s.X_BH.rotation.coeffs() << q.w(), q.x(), q.y(), q.z();  // x y z w read from w x y z
   };
-  const Finding finding = judge_quaternion_order(compare_velocities(changed(w_first)));
+  const RuleFinding finding = judge_quaternion_order(compare_velocities(changed(w_first)));
   CHECK(finding.judgement == Judgement::fail);
   CHECK_THAT(finding.seen, Contains("w x y z"));
   const auto still = [](MotionSample& s) { s.X_BH.rotation.setIdentity(); };
