@@ -33,8 +33,8 @@ int corner_of(const MeshSurface& surface, std::uint32_t triangle, std::uint32_t 
   return corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
 }
 
-/// Returns true if x, near the vertex at the end of the edge, lies on that side of the faces around the
-/// vertex which the edge is convex from. The nearest of them decides.
+/// Returns true if x, near the vertex at the end of the edge, lies on the side of the faces around the vertex
+/// from which the edge is convex. The nearest face decides; of faces equally near, the one that faces x most.
 bool is_in_sector(const MeshSurface& surface, const MeshSurface::Edge& edge, std::uint32_t vertex,
                   const Vector3d& x) noexcept {
   const Vector3d& apex = surface.vertices_m()[vertex];
@@ -54,7 +54,7 @@ bool is_in_sector(const MeshSurface& surface, const MeshSurface::Edge& edge, std
     const std::uint32_t across = surface.neighbour(triangle, next),
                         back = surface.neighbour(triangle, previous);
     const std::uint32_t on = across == from ? back : across;
-    if (on == MeshSurface::kNone) return true;  // a border: the edge tests decide
+    if (on == MeshSurface::kNone) return true;  // at a border there are no two sides
     if (on == edge.triangles[0]) return height > 0.0;
     if (!surface.is_wound_alike(triangle, on == across ? next : previous, on)) side = -side;
     from = triangle;

@@ -13,15 +13,11 @@
 
 namespace wrenchd {
 
-// A feature is also met a little beyond its border, because paths are not quite straight. Beyond the border
-// of a face of a surface, and beyond the end of its edge, the tool may be on the other side of the surface:
-// it slides over the rim of a pocket, past the wall's far side. What adjoins there then rises towards the
-// tool.
-
 /// Returns true if a face beside this one rises above `side`, its plane with the normal towards a tool, and p
 /// lies beyond the border between them. RT-safe.
 bool is_behind_rim(const MeshSurface& surface, std::uint32_t triangle, const MeshSurface::Plane& side,
                    const Vector3d& p) noexcept;
+
 /// Returns the point of an edge, or of its extension, at a fraction of the way to its second vertex [m].
 /// RT-safe.
 inline Vector3d point_on(const MeshSurface& surface, const MeshSurface::Edge& edge,

@@ -130,7 +130,7 @@ std::string wait_until_valid(ProfileDevice& device, Clock& clock, const StopCond
                              const ReportWaiting& waiting) {
   constexpr Duration kPeriod = std::chrono::milliseconds(1), kTimeout = std::chrono::seconds(3);
   TimePoint timeout = clock.now() + kTimeout;
-  bool told_to_home = false;
+  bool asked_to_home = false;
   Fault fault = Fault::none;
   while (clock.now() < timeout) {
     if (stop()) throw SessionCancelled();
@@ -142,11 +142,11 @@ std::string wait_until_valid(ProfileDevice& device, Clock& clock, const StopCond
     if (sample.fresh && sample.homed && device.trusted() && sample.fault == Fault::none) return {};
     if (sample.homed) continue;
     timeout = clock.now() + kTimeout;
-    if (told_to_home) continue;
+    if (asked_to_home) continue;
     const std::string text = wait_text({.kind = WaitReason::Kind::not_homed});
     spdlog::info("{}", text);
     waiting(text);
-    told_to_home = true;
+    asked_to_home = true;
   }
   const std::string seen = fault == Fault::none ? "" : " (" + std::string(fault_row(fault).name) + ")";
   return "it sends no valid pose" + seen +
