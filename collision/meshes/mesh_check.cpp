@@ -39,7 +39,8 @@ namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using SurfaceMesh = ExactMesh;
+using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using FacePair = std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>;
 using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
 
 std::string edge_place(const PolygonSoup& soup, const Edge& e) {
@@ -365,9 +366,12 @@ std::string intersection_text(const SurfaceMesh& mesh, const std::vector<FacePai
                                            : " (" + std::to_string(kMaxIntersections) + " or more in all)");
 }
 
-void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh,
+/// triangles: the faces of the mesh, in the same order.
+void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh, const TriangleMesh& triangles,
                              const std::vector<std::size_t>& face_of, MeshReport& report) {
-  const std::vector<FacePair> pairs = self_intersections(mesh, kMaxIntersections);
+  std::vector<FacePair> pairs;
+  for (const auto& [a, b] : self_intersections(triangles, kMaxIntersections))
+    pairs.emplace_back(SurfaceMesh::Face_index(a), SurfaceMesh::Face_index(b));
   if (pairs.empty()) return;
   const ShellOfFace shell = shells_of(mesh);
   if (pairs.size() < kMaxIntersections) {
@@ -503,9 +507,10 @@ MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
   SurfaceMesh mesh = surface_mesh(soup);
   const std::vector<std::size_t> face_of = triangulate(soup, mesh, report);
   if (!report.defects.empty()) return report;
-  check_self_intersection(soup, mesh, face_of, report);
+  TriangleMesh checked = triangles_of(mesh);
+  check_self_intersection(soup, mesh, checked, face_of, report);
   check_volume(mesh, report);
-  if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
+  if (triangles != nullptr && report.solid()) *triangles = std::move(checked);
   return report;
 }
 

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
+#include <utility>
 
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Surface_mesh.h>
 
 #include "core/in_parallel.hpp"
 
@@ -12,6 +16,9 @@ namespace wrenchd {
 namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
+/// A mesh of triangles for CGAL, with exact predicates.
+using ExactMesh = CGAL::Surface_mesh<CGAL::Exact_predicates_inexact_constructions_kernel::Point_3>;
+using FacePair = std::pair<ExactMesh::Face_index, ExactMesh::Face_index>;
 using Faces = std::vector<ExactMesh::Face_index>;
 
 /// A smaller part takes less time than the start of its thread is worth.
@@ -76,29 +83,32 @@ ExactMesh exact_mesh(const TriangleMesh& mesh) {
 
 }  // namespace
 
-std::vector<FacePair> self_intersections(const ExactMesh& mesh, std::size_t most) {
-  const std::size_t parts = threads_for(mesh.number_of_faces(), kLeastFacesPerThread);
+std::vector<TrianglePairNumbers> self_intersections(const TriangleMesh& mesh, std::size_t most) {
+  const ExactMesh exact = exact_mesh(mesh);
+  const std::size_t parts = threads_for(mesh.triangles.size(), kLeastFacesPerThread);
   const auto named = CGAL::parameters::maximum_number(most);
-  std::vector<FacePair> pairs;
-  if (parts == 1) {
-    PMP::self_intersections(mesh, std::back_inserter(pairs), named);
-    return pairs;
-  }
-  const std::vector<Faces> divided = divide(mesh, longest_axis(mesh), parts);
   std::vector<std::vector<FacePair>> found(parts);
-  in_parallel(parts, parts, [&](std::size_t i) {
-    PMP::self_intersections(divided[i], mesh, std::back_inserter(found[i]), named);
-  });
+  if (parts == 1) {
+    PMP::self_intersections(exact, std::back_inserter(found[0]), named);
+  } else {
+    const std::vector<Faces> divided = divide(exact, longest_axis(exact), parts);
+    in_parallel(parts, parts, [&](std::size_t i) {
+      PMP::self_intersections(divided[i], exact, std::back_inserter(found[i]), named);
+    });
+  }
+  std::vector<TrianglePairNumbers> pairs;
   for (const std::vector<FacePair>& part : found)
-    for (const auto& [a, b] : part) pairs.emplace_back(std::min(a, b), std::max(a, b));
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    for (const auto& [a, b] : part) pairs.push_back({std::min(a, b), std::max(a, b)});
+  if (parts > 1) {
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  }
   if (pairs.size() > most) pairs.resize(most);
   return pairs;
 }
 
 bool intersects_itself(const TriangleMesh& mesh) {
-  return !self_intersections(exact_mesh(mesh), 1).empty();
+  return !self_intersections(mesh, 1).empty();
 }
 
 }  // namespace wrenchd

@@ -1,25 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <utility>
+#include <cstdint>
 #include <vector>
-
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
 
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
-/// A mesh of triangles for CGAL, with exact predicates.
-using ExactMesh = CGAL::Surface_mesh<CGAL::Exact_predicates_inexact_constructions_kernel::Point_3>;
-using FacePair = std::pair<ExactMesh::Face_index, ExactMesh::Face_index>;
+/// The numbers of two triangles, the smaller one first.
+using TrianglePairNumbers = std::array<std::uint32_t, 2>;
 
-/// Returns the pairs of triangles that intersect beyond a common vertex or edge, at most about `most`, each
-/// once and in order. Large meshes are divided by planes across their longest side, and each processor tests
-/// one part. Not RT-safe: allocates, starts threads, takes a second or two per million triangles.
-std::vector<FacePair> self_intersections(const ExactMesh& mesh, std::size_t most);
+/// Returns the pairs of triangles that intersect beyond a common vertex or edge, at most `most`, each once.
+/// Every edge of the mesh must have at most two triangles, wound alike. Large meshes are divided by planes
+/// across their longest side, and each processor tests one part. Not RT-safe: allocates, starts threads,
+/// takes a second or two per million triangles.
+std::vector<TrianglePairNumbers> self_intersections(const TriangleMesh& mesh, std::size_t most);
 
 /// Returns true if two triangles of a closed mesh intersect beyond a common vertex or edge. Not RT-safe: as
 /// self_intersections().
