@@ -28,7 +28,7 @@ double simplification_tolerance_m(const TriangleMesh& mesh, double tolerance_m);
 /// collapses reach: core/METHOD.md, section 14.8. A flat face becomes the few triangles that its border
 /// needs; a curved face keeps what the tolerance requires. mesh: a closed, outward-oriented solid in metres.
 /// Returns the mesh unchanged if it is not a manifold. The result does not intersect itself if `mesh` does
-/// not. Deterministic. Not RT-safe: allocates, takes three or four seconds per million triangles on two
+/// not. Deterministic. Not RT-safe: allocates, takes three to five seconds per million triangles on two
 /// processors.
 SimplifiedMesh simplify_enclosing(TriangleMesh mesh, double tolerance_m);
 
