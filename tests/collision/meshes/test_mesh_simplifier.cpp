@@ -18,6 +18,7 @@
 #include "collision/meshes/mesh_simplifier.hpp"
 #include "collision/meshes/mesh_surface.hpp"
 #include "core/inertia.hpp"
+#include "tests/support/case_count.hpp"
 
 using namespace wrenchd;
 
@@ -127,12 +128,13 @@ TEST_CASE("the simplified surface encloses the solid within the stated distance"
 
 TEST_CASE("a surface that is simplified in parts, on several processors, is as good as one in one piece",
           "[mesh_simplifier]") {
+  const auto large = [](int triangles) { return static_cast<std::size_t>(test::case_count(triangles)); };
   for (const TriangleMesh& cube :
-       {make_mesh({"cube", 400'000}), rounded(rotated(make_mesh({"cube", 400'000})))})
+       {make_mesh({"cube", large(400'000)}), rounded(rotated(make_mesh({"cube", large(400'000)})))})
     CHECK(simplify_enclosing(cube, kTolerance_m).mesh.triangles.size() == 12);
   for (const std::string kind : {"hole", "hare"}) {
     INFO(kind);
-    const TriangleMesh fine = rounded(rotated(make_mesh({kind, 250'000})));
+    const TriangleMesh fine = rounded(rotated(make_mesh({kind, large(250'000)})));
     const SimplifiedMesh simple = simplify_enclosing(fine, kTolerance_m);
     CHECK(simple.mesh.triangles.size() < fine.triangles.size());
     CHECK(simple.distance_m <= kTolerance_m);
