@@ -136,15 +136,21 @@ class DirectionCheck {
   void judge_directions() {
     const DofMask force = driven_ & kLinearDofs, torque = driven_ & kAngularDofs;
     if (force != 0)
-      add("force_direction",
+      add_direction(
+          "force_direction", force,
           pulses_.judge_force(pulse_force_N(profile_), force & sensed_, kLeastSteps * step_.step_m));
     if (torque != 0)
-      add("torque_direction",
+      add_direction(
+          "torque_direction", torque,
           pulses_.judge_torque(pulse_torque_Nm(profile_), torque & sensed_, kLeastSteps * step_.step_rad));
-    const auto unsensed = static_cast<DofMask>(driven_ & ~sensed_);
-    if (unsensed != 0)
-      add("unsensed_axes",
-          {Judgement::not_judged, "the device drives and does not sense " + dof_text(unsensed)});
+  }
+
+  /// A direction is not known to be right if the device does not sense all axes that it drives.
+  void add_direction(const char* rule, DofMask driven, RuleFinding finding) {
+    const auto unsensed = static_cast<DofMask>(driven & ~sensed_);
+    if (unsensed != 0 && finding.judgement == Judgement::pass)
+      finding = {Judgement::not_judged, "the device drives and does not sense " + dof_text(unsensed)};
+    add(rule, std::move(finding));
   }
 
   void judge_velocity(const char* rule, const VelocityComparison& seen, DofMask axes) {

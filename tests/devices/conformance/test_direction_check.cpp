@@ -113,6 +113,24 @@ TEST_CASE("an arm whose motors are swapped fails", "[direction_check]") {
   });
 }
 
+TEST_CASE("a direction is not called right if the device does not sense all axes that it drives",
+          "[direction_check]") {
+  SimulationSettings hand = holding_hand();
+  VirtualClock clock;
+  DeviceProfile blind = reference_profile();
+  blind.pose_report.orientation.present = false;
+  blind.pose_report.angular_velocity.present = false;
+  FirmwareInHand firmware(reference_profile(), hand, {});
+  LoopbackLink link(firmware, clock, hand);
+  ProfileDevice device(blind, link);
+  make_ready(device, clock);
+  const std::vector<RuleResult> results = check_directions(device, clock, [] { return false; });
+  REQUIRE(find(results, "torque_direction") != nullptr);
+  CHECK(find(results, "torque_direction")->judgement == Judgement::not_judged);
+  CHECK_THAT(find(results, "torque_direction")->seen, Contains("does not sense rx ry rz"));
+  CHECK(find(results, "force_direction")->judgement == Judgement::pass);
+}
+
 TEST_CASE("the device is released after the check, and after a cancellation", "[direction_check]") {
   Arm arm(shipped("polhem"), shipped("polhem"));
   arm.check();
