@@ -79,7 +79,7 @@ void announce(const DeviceProfile& profile, const ReportWaiting& waiting) {
 
 /// Result of up to two tests of a device.
 struct TestResult {
-  Results last;    ///< of the last test
+  Results last;    ///< results of the second test, or of the first one if no rule failed in it
   Results broken;  ///< rules that failed in the first test and did not pass in the second
 };
 
@@ -113,7 +113,7 @@ std::string conclude(const RunConfig& config, const UsbDevice* device, const Tes
   if (passed_device.serial.empty()) return {};
   try {
     tested.add(passed_device);
-    spdlog::info("the device passed its test; wrenchd remembers it by its serial number");
+    spdlog::info("the device passed its test; wrenchd stores this by its serial number");
   } catch (const std::exception& error) {
     spdlog::warn("the device passed its test, and will be tested again at the next start: {}", error.what());
   }

@@ -26,8 +26,9 @@ bool needs_first_test(const RunConfig& config, const UsbDevice* device, const Te
 /// all other report layouts. Not RT-safe: reads a file.
 bool needs_direction_test(const RunConfig& config, const UsbDevice* device, const TestedDevices& tested);
 
-/// Reason why a device cannot be armed while its test runs.
-inline constexpr const char* kTestRuns = "its first test runs; try again in some seconds";
+/// Reason why a device cannot be armed while it is homed or tested.
+inline constexpr const char* kTestRuns =
+    "it is being homed or tested; follow the instructions in the log, then try again";
 
 /// Tests a device of the open report layout: check_conformance() without a moving hand. If a rule fails, the
 /// test runs a second time, because a delay of this machine can spoil a test; a rule that fails in the first
