@@ -99,10 +99,8 @@ std::vector<TrianglePairNumbers> self_intersections(const TriangleMesh& mesh, st
   std::vector<TrianglePairNumbers> pairs;
   for (const std::vector<FacePair>& part : found)
     for (const auto& [a, b] : part) pairs.push_back({std::min(a, b), std::max(a, b)});
-  if (parts > 1) {
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   if (pairs.size() > most) pairs.resize(most);
   return pairs;
 }
