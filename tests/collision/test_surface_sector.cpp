@@ -7,27 +7,16 @@
 #include <catch2/catch.hpp>
 
 #include "collision/surface_sector.hpp"
+#include "tests/support/pocket_meshes.hpp"
 
 namespace wrenchd {
 namespace {
 
 constexpr double kOver_m = 1e-9, kClearance_m = 1e-9;
 
-/// A block of 0.14 m x 0.14 m x 0.04 m with its top in z = 0 and a pocket of 0.1 m x 0.1 m x 0.03 m, as a
-/// surface. inside_out: wound the other way.
-MeshSurface block_with_pocket(bool inside_out) {
-  TriangleMesh mesh;
-  for (const auto& [half_m, z_m] :
-       {std::pair(0.07, -0.04), std::pair(0.07, 0.0), std::pair(0.05, 0.0), std::pair(0.05, -0.03)})
-    for (const auto& [x, y] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
-      mesh.vertices_m.emplace_back(half_m * x, half_m * y, z_m);
-  mesh.triangles = {{0, 2, 1}, {0, 3, 2}, {12, 13, 14}, {12, 14, 15}};
-  for (std::uint32_t ring = 0; ring < 3; ++ring)
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      const std::uint32_t a = 4 * ring + i, b = 4 * ring + (i + 1) % 4;
-      mesh.triangles.push_back({a, b, b + 4});
-      mesh.triangles.push_back({a, b + 4, a + 4});
-    }
+/// A tray as a surface. inside_out: wound the other way.
+MeshSurface tray_surface(bool inside_out) {
+  TriangleMesh mesh = test::tray();
   if (inside_out)
     for (auto& corners : mesh.triangles) std::swap(corners[1], corners[2]);
   return MeshSurface(std::move(mesh), BodyKind::surface);
@@ -51,15 +40,15 @@ std::pair<std::uint32_t, MeshSurface::Plane> face_at_x(const MeshSurface& surfac
 
 }  // namespace
 
-TEST_CASE("a tool above the rim is behind the end of the pocket's upright edge", "[surface_sector]") {
+TEST_CASE("a tool above the rim is behind the end of the tray's upright edge", "[surface_sector]") {
   const Vector3d diagonal = Vector3d(1.0, 1.0, 0.0).normalized(), up = Vector3d::UnitZ();
   for (const bool inside_out : {false, true}) {
-    const MeshSurface surface = block_with_pocket(inside_out);
-    const MeshSurface::Edge& in_pocket = edge_between(surface, 10, 14);  // at (0.05, 0.05)
+    const MeshSurface surface = tray_surface(inside_out);
+    const MeshSurface::Edge& in_tray = edge_between(surface, 10, 14);  // at (0.05, 0.05)
     const Vector3d rim(0.05, 0.05, 0.0);
-    CHECK(is_behind_end(surface, in_pocket, -diagonal, rim + kOver_m * up, kClearance_m));
+    CHECK(is_behind_end(surface, in_tray, -diagonal, rim + kOver_m * up, kClearance_m));
     // In the material, seen from which the edge is convex.
-    CHECK_FALSE(is_behind_end(surface, in_pocket, diagonal, rim - 1e-3 * up, kClearance_m));
+    CHECK_FALSE(is_behind_end(surface, in_tray, diagonal, rim - 1e-3 * up, kClearance_m));
     const MeshSurface::Edge& outside = edge_between(surface, 2, 6);  // at (0.07, 0.07)
     const Vector3d corner(0.07, 0.07, 0.0);
     CHECK_FALSE(is_behind_end(surface, outside, diagonal, corner + kOver_m * up, kClearance_m));
@@ -70,7 +59,7 @@ TEST_CASE("a tool above the rim is behind the end of the pocket's upright edge",
 TEST_CASE("a vertex above the rim is behind the far side of a wall, and not behind the near side",
           "[surface_sector]") {
   for (const bool inside_out : {false, true}) {
-    const MeshSurface surface = block_with_pocket(inside_out);
+    const MeshSurface surface = tray_surface(inside_out);
     for (const auto& [x_m, free_side] : {std::pair(0.07, 1.0), std::pair(0.05, -1.0)}) {
       INFO("wall at x = " << x_m);
       const Vector3d above(x_m, 0.01, kOver_m), below(x_m, 0.01, -kOver_m);

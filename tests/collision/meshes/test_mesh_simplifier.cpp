@@ -86,6 +86,19 @@ Comparison compare(const TriangleMesh& original, const TriangleMesh& simplified)
   return result;
 }
 
+void check_encloses(const TriangleMesh& fine, const SimplifiedMesh& simple) {
+  CHECK(simple.mesh.triangles.size() <= fine.triangles.size());
+  CHECK(simple.distance_m <= kTolerance_m);
+  const Surface surface = surface_of(simple.mesh);
+  REQUIRE(surface.number_of_faces() == simple.mesh.triangles.size());
+  CHECK(CGAL::is_closed(surface));
+  CHECK_FALSE(CGAL::Polygon_mesh_processing::does_self_intersect(surface));
+  const Comparison measured = compare(fine, simple.mesh);
+  CHECK(measured.farthest_m <= simple.distance_m + 1e-12);
+  CHECK(measured.deepest_m < 3e-10);
+  CHECK(solid_properties(simple.mesh, 1.0).volume_m3 > solid_properties(fine, 1.0).volume_m3 * (1.0 - 1e-9));
+}
+
 }  // namespace
 
 TEST_CASE("a cube has twelve triangles, however finely its faces are cut", "[mesh_simplifier]") {
@@ -110,18 +123,7 @@ TEST_CASE("the simplified surface encloses the solid within the stated distance"
        {"peg", "hole", "gear", "dowel", "socket", "bolt", "nut", "key", "lock", "hare"}) {
     INFO(kind);
     for (const TriangleMesh& fine : {make_mesh({kind, 20000}), rounded(rotated(make_mesh({kind, 20000})))}) {
-      const SimplifiedMesh simple = simplify_enclosing(fine, kTolerance_m);
-      CHECK(simple.mesh.triangles.size() <= fine.triangles.size());
-      CHECK(simple.distance_m <= kTolerance_m);
-      const Surface surface = surface_of(simple.mesh);
-      REQUIRE(surface.number_of_faces() == simple.mesh.triangles.size());
-      CHECK(CGAL::is_closed(surface));
-      CHECK_FALSE(CGAL::Polygon_mesh_processing::does_self_intersect(surface));
-      const Comparison measured = compare(fine, simple.mesh);
-      CHECK(measured.farthest_m <= simple.distance_m + 1e-12);
-      CHECK(measured.deepest_m < 3e-10);
-      CHECK(solid_properties(simple.mesh, 1.0).volume_m3 >
-            solid_properties(fine, 1.0).volume_m3 * (1.0 - 1e-9));
+      check_encloses(fine, simplify_enclosing(fine, kTolerance_m));
     }
   }
 }
@@ -137,14 +139,7 @@ TEST_CASE("a surface that is simplified in parts, on several processors, is as g
     const TriangleMesh fine = rounded(rotated(make_mesh({kind, large(250'000)})));
     const SimplifiedMesh simple = simplify_enclosing(fine, kTolerance_m);
     CHECK(simple.mesh.triangles.size() < fine.triangles.size());
-    CHECK(simple.distance_m <= kTolerance_m);
-    const Surface surface = surface_of(simple.mesh);
-    REQUIRE(surface.number_of_faces() == simple.mesh.triangles.size());
-    CHECK(CGAL::is_closed(surface));
-    CHECK_FALSE(CGAL::Polygon_mesh_processing::does_self_intersect(surface));
-    const Comparison measured = compare(fine, simple.mesh);
-    CHECK(measured.farthest_m <= simple.distance_m + 1e-12);
-    CHECK(measured.deepest_m < 1e-9);
+    check_encloses(fine, simple);
     const SimplifiedMesh again = simplify_enclosing(fine, kTolerance_m);
     CHECK(again.mesh.triangles == simple.mesh.triangles);
     CHECK(again.mesh.vertices_m == simple.mesh.vertices_m);
