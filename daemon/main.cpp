@@ -2,10 +2,8 @@
 #include <exception>
 #include <string>
 
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "daemon/command_line.hpp"
 #include "daemon/daemon_run.hpp"
 #include "daemon/log_output.hpp"
 #include "daemon/options.hpp"
@@ -36,11 +34,8 @@ int run(const wrenchd::Options& options, wrenchd::LogOutput& log) {
 
 int main(int argc, char** argv) {
   if (!wrenchd::open_standard_streams()) return wrenchd::kExitRejected;
-  CLI::App app;
   wrenchd::Options options;
-  wrenchd::add_options(app, options);
-  wrenchd::advise_on_mistakes(app);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = wrenchd::parse_command_line(argc, argv, options)) return *code;
   wrenchd::LogOutput log(options.verbose);
   const int code = run(options, log);
   // If the log is not read, a thread is left in a write, and must not meet the destructors of the process.

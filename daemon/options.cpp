@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/files/absolute_name.hpp"
+#include "daemon/command_line.hpp"
 #include "daemon/guide_line.hpp"
 #include "daemon/hand_file.hpp"
 #include "daemon/option_checks.hpp"
@@ -133,6 +134,18 @@ void add_options(CLI::App& app, Options& options) {
   add_file_options(app, options);
   add_device_options(app, options);
   add_run_options(app, options);
+}
+
+std::optional<int> parse_command_line(int argc, const char* const* argv, Options& options) {
+  CLI::App app;
+  add_options(app, options);
+  advise_on_mistakes(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& end) {
+    return app.exit(end);
+  }
+  return std::nullopt;
 }
 
 std::vector<RunConfig> load_run_configs(const Options& options) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,10 @@ struct Options {
 
 /// Adds the options and the help text to `app`. `options` must outlive the parsing. Not RT-safe: allocates.
 void add_options(CLI::App& app, Options& options);
+
+/// Parses the command line of the process into `options`. If the program must end now, prints --help,
+/// --version or the mistake, and returns the exit code. Not RT-safe: allocates.
+std::optional<int> parse_command_line(int argc, const char* const* argv, Options& options);
 
 /// Reads the configuration files and applies the command line on top of them, for each hand. The path and the
 /// faults of a simulated hand on the command line are those of the first hand. Throws ConfigError for a file

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/calibrate.hpp"
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <stdexcept>
 
@@ -14,13 +12,12 @@
 #include "devices/device_homing.hpp"
 #include "devices/links/reconnecting_link.hpp"
 #include "tools/connected_device.hpp"
+#include "tools/end_signals.hpp"
 
 namespace wrenchd {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
-
-std::atomic<bool> interrupted{false};
 
 /// Returns true if the operator has typed a line since the last call.
 bool line_typed() {
@@ -66,14 +63,14 @@ int run_calibrate(const CalibrateOptions& options) {
   ProfileDevice device(target.profile, link);
   WallClock clock;
   device.open();
-  std::signal(SIGINT, [](int) { interrupted.store(true); });
+  catch_end_signals();
   std::printf("%s, serial number %s. The motors stay off. Ctrl-C cancels.\n", target.profile.name.c_str(),
               serial.c_str());
   const OperatorInterface operator_interface = {[](const std::string& instruction) {
                                                   std::printf("%s\n", instruction.c_str());
                                                   std::fflush(stdout);
                                                 },
-                                                line_typed, [] { return interrupted.load(); }};
+                                                line_typed, end_requested};
   const auto release_device = [&] {
     device.release(clock.now());
     device.close();

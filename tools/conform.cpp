@@ -2,7 +2,6 @@
 #include "tools/conform.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "devices/links/socket_link.hpp"
 #include "devices/links/usb_link.hpp"
 #include "tools/connected_device.hpp"
+#include "tools/end_signals.hpp"
 
 namespace wrenchd {
 namespace {
@@ -26,17 +26,13 @@ namespace {
 /// writer thread of the link sends zeros.
 constexpr Duration kHostWatchdog = std::chrono::milliseconds(20);
 
-std::atomic<bool> interrupted{false};
-
 const char* text(Judgement judgement) {
   return judgement == Judgement::pass ? "pass" : judgement == Judgement::fail ? "FAIL" : "not judged";
 }
 
-/// Every signal that a user or a terminal sends to end the program ends the session instead, which releases
-/// the device.
+/// The end of the session releases the device, so nothing else may end or suspend the program.
 void catch_signals() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT})
-    std::signal(signal, [](int) { interrupted.store(true); });
+  catch_end_signals();
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGTSTP, SIG_IGN);  // a suspended process cannot release the device
 }
@@ -94,7 +90,7 @@ bool run_conform(const ConformOptions& options) {
   WallClock clock;
   const ConformanceUser user = {
       [](const std::string& instruction) { std::fprintf(stderr, "%s\n", instruction.c_str()); },
-      [] { return interrupted.load(); }};
+      end_requested};
   const auto results =
       check_conformance(target.profile, *target.link, target.device ? &*target.device : nullptr, clock, user,
                         {from_seconds(options.motion_s), options.pulses});

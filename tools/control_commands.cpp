@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/control_commands.hpp"
 
-#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -24,6 +22,7 @@
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/owned_fd.hpp"
 #include "tools/daemon_call.hpp"
+#include "tools/end_signals.hpp"
 #include "tools/output_file.hpp"
 
 namespace wrenchd {
@@ -34,14 +33,6 @@ using namespace std::chrono_literals;
 /// Heartbeat interval: a third of the heartbeat timeout, so that two heartbeats may be late.
 constexpr auto kHeartbeatInterval = 30ms;
 constexpr auto kFadeTimeout = 2s;
-
-std::atomic<bool> interrupted{false};
-
-void catch_signals() {
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted.store(true); };
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
-}
 
 std::string text_or(const Json& value, const char* fallback) {
   return value.is_string() ? value.get<std::string>() : fallback;
@@ -144,24 +135,24 @@ void run_status(const ControlOptions& options) {
 }
 
 void run_watch(const ControlOptions& options) {
-  catch_signals();
+  catch_end_signals();
   Client client(options.socket, kResponseTimeout);
   const Json params = options.events.empty() ? Json::object() : Json{{"events", options.events}};
   const Json status = call(client, "subscribe", params);
   print(options.json ? status.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'
                      : status_text(status));
-  while (!interrupted)
+  while (!end_requested())
     if (const auto event = next_event(client, 200ms)) show(*event, options);
 }
 
 int run_arm(const ControlOptions& options) {
-  catch_signals();
+  catch_end_signals();
   Client client(options.socket, kResponseTimeout);
   call(client, "subscribe", {{"events", {"state", "fault", "arming_rejected", "lease", "events_lost"}}});
   call(client, "lease.acquire", options.preempt ? Json{{"preempt", true}} : Json::object());
   call(client, "arm");
   std::string state = "waiting";
-  while (!interrupted) {
+  while (!end_requested()) {
     client.heartbeat();
     const auto event = next_event(client, kHeartbeatInterval);
     if (!event) continue;

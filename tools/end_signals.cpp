@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/end_signals.hpp"
+
+#include <atomic>
+#include <csignal>
+
+namespace wrenchd {
+namespace {
+
+std::atomic<bool> requested{false};
+
+}  // namespace
+
+void catch_end_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { requested.store(true); };
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaction(signal, &action, nullptr);
+}
+
+bool end_requested() noexcept {
+  return requested.load();
+}
+
+}  // namespace wrenchd
