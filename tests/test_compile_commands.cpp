@@ -8,6 +8,8 @@
 
 #include "tests/support/paths.hpp"
 
+namespace wrenchd::test_compile_commands {
+
 namespace {
 
 /// The commands by which all of this was built, one a source, words apart. CMake writes one entry a line
@@ -67,3 +69,5 @@ TEST_CASE("the files that limit the wrench have explicit flags for strict IEEE a
   }
   CHECK(found == 2);
 }
+
+}  // namespace wrenchd::test_compile_commands

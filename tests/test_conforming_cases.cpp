@@ -14,7 +14,10 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd::test {
+namespace wrenchd::test_conforming_cases {
+
+using namespace test;
+
 namespace {
 
 /// One small case of each shape and profile.
@@ -173,4 +176,4 @@ TEST_CASE("the hand that seeks contact reaches the obstacle, within its speed an
 }
 
 }  // namespace
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_conforming_cases

@@ -10,7 +10,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/run_program.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_growth {
+
 namespace {
 
 using namespace test;
@@ -72,4 +73,4 @@ TEST_CASE("the cost by mesh size is written cell by cell and plotted", "[growth]
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_growth

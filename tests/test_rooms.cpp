@@ -10,6 +10,8 @@
 
 #include "tests/support/paths.hpp"
 
+namespace wrenchd::test_rooms {
+
 // The rooms of the source tree, as the README draws them: dependencies point one way.
 
 namespace {
@@ -73,6 +75,30 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
   }
 }
 
+// Builds from nothing compile tests in groups, in which names of two files must not clash.
+TEST_CASE("a file of tests has a namespace of its name, and no code outside of it", "[rooms]") {
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(test::source_path()) / "tests")) {
+    const std::string stem = entry.path().stem();
+    if (!stem.starts_with("test_") || entry.path().extension() != ".cpp") continue;
+    ++files;
+    INFO(entry.path());
+    std::ifstream in(entry.path());
+    const std::string opening = "namespace wrenchd::" + stem + " {";
+    const std::string closing = "}  // namespace wrenchd::" + stem;
+    bool inside = false, closed = false;
+    for (std::string line; std::getline(in, line);) {
+      const bool code = !line.empty() && !line.starts_with("#include ") && !line.starts_with("//");
+      if (line == opening) inside = true;
+      if (code && !inside) FAIL_CHECK("before the namespace: " << line);
+      if (code && closed) FAIL_CHECK("after the namespace: " << line);
+      if (line == closing) closed = true;
+    }
+    CHECK(closed);
+  }
+  CHECK(files > 200);
+}
+
 TEST_CASE("the firmware reference includes only the integer headers of C99", "[rooms]") {
   for (const char* file : {"wrench_firmware.h", "wrench_firmware.c"}) {
     std::ifstream in(fs::path(wrenchd::test::source_path("devices/firmware")) / file);
@@ -114,3 +140,5 @@ TEST_CASE("code of the servo thread includes no header that allocates, locks or 
   }
   REQUIRE(files > 100);
 }
+
+}  // namespace wrenchd::test_rooms

@@ -23,7 +23,7 @@ constexpr double kSignificance = 5.0;
 /// The pulses stop if the handle moves by more than this in one half.
 constexpr double kMaxPulseTravel_m = 0.02, kMaxPulseTurn_rad = 0.3;
 /// Time with the motors on before the first pulse along an axis.
-constexpr Duration kSettle = 30ms;
+constexpr Duration kMotorsOn = 30ms;
 /// Two couplings of a symmetric response differ by at most this share of the larger one.
 constexpr double kMaxAsymmetry = 0.5;
 
@@ -137,7 +137,7 @@ DirectionPulses::Response DirectionPulses::apply(bool force, int axis, double si
   response.force = force;
   response.least = least;
   std::vector<Vector3d> moved;
-  drive(kSettle, {});
+  drive(kMotorsOn, {});
   // Half a pulse before the first one, so that every pulse begins with the motion of the one before it.
   drive(pace_.pulse / 2, -1.0 * F);
   const double too_far = force ? kMaxPulseTravel_m : kMaxPulseTurn_rad;

@@ -7,7 +7,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr Duration kFrame = std::chrono::milliseconds(1);
+constexpr Duration kFalconFrame = std::chrono::milliseconds(1);
 constexpr std::size_t kPacket = 16;
 constexpr std::size_t kShortPacket = 14;
 constexpr std::uint8_t kStartMarker = '<', kEndMarker = '>', kNibble = 'A';
@@ -136,7 +136,7 @@ void EmulatedFalcon::advance_to(TimePoint t, ReportSink& host) noexcept {
     next_frame_ = t;
     faults_.power_on(t);
   }
-  for (; next_frame_ <= t; next_frame_ += kFrame)
+  for (; next_frame_ <= t; next_frame_ += kFalconFrame)
     if (reply_due_) send(host);
 }
 

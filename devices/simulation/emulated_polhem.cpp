@@ -6,7 +6,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr Duration kFrame = std::chrono::milliseconds(1);
+constexpr Duration kPolhemFrame = std::chrono::milliseconds(1);
 constexpr std::size_t kUsedBytes = 14;
 constexpr int kButtonInEncoderD = 10'000;
 
@@ -22,7 +22,7 @@ void EmulatedPolhem::advance_to(TimePoint t, ReportSink& host) noexcept {
     faults_.power_on(t);
     next_frame_ = t;
   }
-  for (; next_frame_ <= t; next_frame_ += kFrame) {
+  for (; next_frame_ <= t; next_frame_ += kPolhemFrame) {
     if (amplifiers_on_ && next_frame_ - last_command_at_ >= kWatchdog) {
       amplifiers_on_ = false;
       currents_mA_ = {};

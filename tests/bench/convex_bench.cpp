@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -15,7 +14,6 @@
 namespace wrenchd::bench {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Relative error up to which a depth counts as correct in double precision.
 constexpr double kDouble = 1e-6;
 constexpr double kFloat = 1e-3;  ///< relative error up to which a depth counts as correct in single precision
@@ -60,7 +58,7 @@ TimedMethod wrenchd_runner(std::string name, const ConvexPair& pair, Method meth
             const Penetration out = follower->follow(i);
             const Projection& q = out.projection;
             const bool found = q.status != ProjectionStatus::infeasible && q.status != ProjectionStatus::free;
-            return {found ? std::sqrt(q.energy / mass_kg) : kNaN, q.kkt_residual, q.active.size(),
+            return {found ? std::sqrt(q.energy / mass_kg) : kNoAnswer, q.kkt_residual, q.active.size(),
                     q.status == ProjectionStatus::converged};
           }};
 }

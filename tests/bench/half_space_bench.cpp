@@ -15,7 +15,6 @@ namespace wrenchd::bench {
 namespace {
 
 constexpr int kPlanes = 47;  // number of planes in the paper
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// Energies with a relative difference below this value count as equal. The value is well above rounding
 /// error.
 constexpr double kSameEnergy = 1e-9;
@@ -23,7 +22,7 @@ constexpr double kSameEnergy = 1e-9;
 enum Row : std::size_t { kCold, kWarm, kFollow, kPlanar };
 
 Answer answer_of(const Projection& q) {
-  if (q.status == ProjectionStatus::infeasible) return {kNaN, 0.0, 0, false};
+  if (q.status == ProjectionStatus::infeasible) return {kNoAnswer, 0.0, 0, false};
   return {q.energy, q.kkt_residual, q.active.size(), q.status == ProjectionStatus::converged};
 }
 

@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 
 namespace wrenchd::bench {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// On an idle machine the passes of one method differ by a few per cent.
 constexpr double kInconclusive = 0.1;
@@ -35,7 +32,7 @@ std::vector<MethodTiming> time_methods(const std::vector<TimedMethod>& runners, 
     results[r].name = runners[r].name;
     runners[r].restart();
     for (std::size_t i = 0; i < poses; ++i)
-      results[r].answers.push_back(i % runners[r].every == 0 ? runners[r].solve(i) : Answer{kNaN});
+      results[r].answers.push_back(i % runners[r].every == 0 ? runners[r].solve(i) : Answer{kNoAnswer});
   }
 
   std::vector<std::vector<double>> least_ns(runners.size());

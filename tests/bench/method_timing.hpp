@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,9 +19,12 @@ struct Effort {
   bool quick = false;  ///< only small cases
 };
 
+/// The value of an answer of a method that found nothing, or did not solve the pose.
+inline constexpr double kNoAnswer = std::numeric_limits<double>::quiet_NaN();
+
 /// The result of one method at one pose. A method fills the fields that it computes.
 struct Answer {
-  /// energy or depth, depending on the table; NaN if the method found nothing or did not solve the pose
+  /// energy or depth, depending on the table; or kNoAnswer
   double value = 0.0;
   double kkt_residual = 0.0;
   std::size_t active = 0;  ///< number of active contacts at q

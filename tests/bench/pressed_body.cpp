@@ -12,7 +12,7 @@
 namespace wrenchd::bench {
 namespace {
 
-constexpr double kTick_s = 1e-3;
+constexpr double kPressTick_s = 1e-3;
 constexpr double kBaseRadius_m = 0.03;
 /// Over the base the bowl rises by less than 1 mm, so the tilt of the path changes which vertex is the
 /// lowest.
@@ -75,7 +75,7 @@ PressedBody pressed(std::string name, std::vector<Vector3d> base, double tilt_ra
 
   std::vector<Pose> X_WP;
   for (std::size_t i = 0; i < poses; ++i) {
-    const double t = kTick_s * static_cast<double>(i);
+    const double t = kPressTick_s * static_cast<double>(i);
     // Depth of the highest vertex of the base.
     const double cover_m = 1e-3 * (0.5 + 0.4 * std::sin(25.0 * t));
     Pose X = sliding(t, tilt_rad);

@@ -68,7 +68,7 @@ ObstacleMotion random_motion(std::uint64_t seed) {
 bool jumped(const ManipulationCase& handling, const Pose& X_OT_before, const Pose& X_OT_after) {
   const double wide_m = 0.03;
   const Vector3d &before = X_OT_before.translation_m, &after = X_OT_after.translation_m;
-  return handling.motion == HandMotion::stab && handling.obstacle.kind == "plate" &&
+  return handling.motion == Handling::stab && handling.obstacle.kind == "plate" &&
          before.z() * after.z() < 0.0 && before.head<2>().norm() < wide_m && after.head<2>().norm() < wide_m;
 }
 
@@ -161,7 +161,7 @@ struct ConformingManipulation {
 };
 
 const std::vector<ConformingManipulation>& conforming_manipulations() {
-  using enum HandMotion;
+  using enum Handling;
   static const std::vector<ConformingManipulation> all = {
       {{"flat cube on a flat slab", {}, {}, slide, {0, 0, 0.026}}, "cube 10k / 10k, exact"},
       {{"flat cube on a flat slab, float", {}, {}, slide, {0, 0, 0.026}}, "cube 10k / 10k, float, rotated"},

@@ -15,7 +15,8 @@
 #include "collision/tool_body.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_clearance {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -137,3 +138,5 @@ TEST_CASE("a pose that overlaps has no clearance, and one that is free has some"
   CHECK(overlapping > 5);
   CHECK(free > 5);
 }
+
+}  // namespace wrenchd::test_clearance

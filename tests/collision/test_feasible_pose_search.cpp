@@ -7,7 +7,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_feasible_pose_search {
+
 namespace {
 
 using namespace test;
@@ -69,4 +70,4 @@ TEST_CASE("a peg in its hole stays there", "[feasible_pose_search]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_feasible_pose_search

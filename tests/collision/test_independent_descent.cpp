@@ -8,7 +8,8 @@
 #include "tests/support/independent_descent.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_independent_descent {
+
 using namespace wrenchd::test;
 
 // The judge of prove_proxy --descents must be able to find a closer pose where there is one.
@@ -42,3 +43,5 @@ TEST_CASE("a random search finds the way down from a pose that is not the closes
   CHECK(search(raised) < 1.003 * optimum);
   CHECK(search(raised) > (1.0 - 1e-5) * optimum);
 }
+
+}  // namespace wrenchd::test_independent_descent

@@ -7,7 +7,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_contacts {
+
 namespace {
 
 using namespace test;
@@ -178,4 +179,4 @@ TEST_CASE("sweeps within the reach of one list need no second traversal", "[mesh
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_contacts

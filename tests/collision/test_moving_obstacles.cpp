@@ -12,9 +12,10 @@
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
 
+namespace wrenchd::test_moving_obstacles {
+
 // Moving obstacles displace the proxy, which stays admissible and passes through none of them.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -257,4 +258,4 @@ TEST_CASE("following moving obstacles neither allocates nor locks", "[moving][re
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_moving_obstacles

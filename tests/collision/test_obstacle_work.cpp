@@ -7,9 +7,10 @@
 #include "collision/penetration.hpp"
 #include "tests/support/manipulation_case.hpp"
 
+namespace wrenchd::test_obstacle_work {
+
 // The work of moving obstacles on the spring is the rise of T while the hand is at rest.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -82,4 +83,4 @@ TEST_CASE("an obstacle at rest does no work, however large the contact force", "
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_obstacle_work

@@ -17,7 +17,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_penetration {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -395,3 +396,5 @@ TEST_CASE("without moving obstacles the scene time does not matter", "[penetrati
     CHECK(a.follow(c.X_WP, X_last).eps == b.follow(c.X_WP, X_last, 9.0).eps);
   }
 }
+
+}  // namespace wrenchd::test_penetration

@@ -17,7 +17,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/unbalanced_pull.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_proxy {
+
 namespace {
 
 using namespace test;
@@ -410,8 +411,7 @@ FollowedTicks follow_ticks(const Scene& scene, const Pose& X_start, int first, i
 // Back and forth along a boulder, pressed into it, with rests of 20 ticks. Each movement starts anew, without
 // a candidate list for it.
 TEST_CASE("bodies of 20,000 triangles never defer work", "[proxy]") {
-  const Scene scene =
-      scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, Handling::slide, {}});
   const auto hand = [](int tick) -> Pose {
     const int phase = std::max(tick, 0) / 60, within = std::min(std::max(tick, 0) % 60, 40);
     const double s = 1e-4 * (phase % 2 == 0 ? within : 40 - within);
@@ -431,7 +431,7 @@ TEST_CASE("bodies of 20,000 triangles never defer work", "[proxy]") {
 // The unit is node visits, not time. If the hand starts to move or reverses in a tight fit of fine bodies, a
 // candidate list is missing. A tick that builds it immediately needs more than the period.
 TEST_CASE("a tick that would exceed the period defers work, and the proxy catches up", "[proxy]") {
-  const Scene scene = scene_of({"tight fit", {"peg", 20'000}, {"hole", 40'000}, HandMotion::slide, {}});
+  const Scene scene = scene_of({"tight fit", {"peg", 20'000}, {"hole", 40'000}, Handling::slide, {}});
   const auto hand = [](int tick) -> Pose {
     const int phase = std::max(tick, 0) / 100, within = std::min(std::max(tick, 0) % 100, 40);
     const double s = 5e-5 * (phase % 2 == 0 ? within : 40 - within);
@@ -455,8 +455,7 @@ TEST_CASE("a tick that would exceed the period defers work, and the proxy catche
 
 /// From rest to 0.1 m/s, along and around a boulder at this distance from its centre.
 std::vector<Projection> slid_along(double away_m, std::vector<std::uint32_t>& visits) {
-  const Scene scene =
-      scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, Handling::slide, {}});
   Proxy proxy(scene);
   std::vector<Projection> all;
   Pose X_WQ = {Quaterniond::Identity(), {0.13, 0, 0}};
@@ -516,4 +515,4 @@ TEST_CASE("following a hand through meshes neither allocates nor locks", "[realt
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_proxy

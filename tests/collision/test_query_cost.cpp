@@ -7,7 +7,7 @@
 #include "collision/query_cost.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_query_cost {
 
 namespace {
 
@@ -49,3 +49,5 @@ TEST_CASE("there is no estimate without mesh obstacles at rest", "[query_cost]")
   motion.linear_m_per_s = Vector3d(0.1, 0, 0);
   CHECK(estimate_query_cost(scene_of({"cube", 12}, {"cube", 12}, motion), 1.0).ticks == 0);
 }
+
+}  // namespace wrenchd::test_query_cost

@@ -7,7 +7,8 @@
 #include "tests/support/separation.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scene {
+
 namespace {
 
 using namespace test;
@@ -138,4 +139,4 @@ TEST_CASE("a scene with new poses shares its meshes, and scheduled motions apply
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene

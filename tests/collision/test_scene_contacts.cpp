@@ -9,7 +9,8 @@
 #include "collision/scene_contacts.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scene_contacts {
+
 namespace {
 
 using namespace test;
@@ -262,4 +263,4 @@ TEST_CASE("a far obstacle does not affect a near one") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene_contacts

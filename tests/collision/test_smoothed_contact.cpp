@@ -14,7 +14,8 @@
 #include "collision/scene.hpp"
 #include "core/energy_law.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_smoothed_contact {
+
 namespace {
 
 constexpr double kTick_s = 1e-3;
@@ -187,4 +188,4 @@ TEST_CASE("smoothing halves the facets of a ball that rolls on a mesh", "[smooth
   CHECK(smooth.not_converged <= 12);  // of 1,200 ticks
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_smoothed_contact

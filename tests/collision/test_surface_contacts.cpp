@@ -17,10 +17,11 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/sweep_comparison.hpp"
 
+namespace wrenchd::test_surface_contacts {
+
 // Obstacles of kind "surface": their interior edges must not hold the tool, and nothing may pass through
 // them.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -117,7 +118,7 @@ struct SolidCase {
 };
 
 std::vector<SolidCase> solid_cases() {
-  using enum HandMotion;
+  using enum Handling;
   const TriangleMesh cube = make_mesh({"cube", 12}), bumpy = make_mesh({"bumpy", 500});
   return {
       {{"cube on a ridge", {}, {}, slide, {0, 0, 0.03}}, cube, split_at_random(ridge(), 300, 1)},
@@ -150,7 +151,7 @@ TEST_CASE("a closed mesh as a surface holds a tool as the solid does", "[surface
 TEST_CASE("the far sides of the walls of pockets do not hold a tool that slides and turns over their rims",
           "[surface_contacts]") {
   const TriangleMesh cube = make_mesh({"cube", 12});
-  const ManipulationCase handling = {"", {}, {}, HandMotion::slide, {0, 0, 0.03}};
+  const ManipulationCase handling = {"", {}, {}, Handling::slide, {0, 0, 0.03}};
   for (const std::uint32_t n : {2, 3, 4, 6}) {
     Difference d =
         compare(against(cube, block_with_pockets(n), BodyKind::solid),
@@ -163,7 +164,7 @@ TEST_CASE("the far sides of the walls of pockets do not hold a tool that slides 
 
 TEST_CASE("a tool with pockets, as a surface, moves as the solid does over the edges of a box",
           "[surface_contacts]") {
-  const ManipulationCase handling = {"", {}, {}, HandMotion::slide, {0, 0, 0.03}};
+  const ManipulationCase handling = {"", {}, {}, Handling::slide, {0, 0, 0.03}};
   TriangleMesh box = make_mesh({"cube", 12});
   for (Vector3d& p : box.vertices_m) p.z() -= 0.025;  // its top is in z = 0
   for (const std::uint32_t n : {2, 3, 4, 6}) {
@@ -228,7 +229,7 @@ TEST_CASE("the winding of a surface and ribs on its far side do not change how i
           "[surface_contacts]") {
   constexpr std::uint32_t kCells = 10;
   const TriangleMesh cube = make_mesh({"cube", 12});
-  const ManipulationCase handling = {"", {}, {}, HandMotion::slide, {0, 0, 0.03}};
+  const ManipulationCase handling = {"", {}, {}, Handling::slide, {0, 0, 0.03}};
   for (const bool is_wavy : {false, true}) {
     const auto shaped = [&](const TriangleMesh& mesh) { return is_wavy ? wavy(mesh) : mesh; };
     const TriangleMesh plain = shaped(sheet(kCells, false));
@@ -250,7 +251,7 @@ TEST_CASE("the border of a sheet holds a tool as that of a thin plate does", "[s
   const TriangleMesh cube = make_mesh({"cube", 12});
   for (const Vector3d& start_m :
        {Vector3d(0.1, 0, 0.03), Vector3d(0.13, 0.13, 0.02), Vector3d(0.14, 0, 0.004)}) {
-    const ManipulationCase handling = {"", {}, {}, HandMotion::slide, start_m};
+    const ManipulationCase handling = {"", {}, {}, Handling::slide, start_m};
     Difference d = compare(against(cube, plate, BodyKind::solid),
                            against(cube, sheet(4, true), BodyKind::surface), handling, case_count(1500));
     INFO("from " << start_m.transpose() << ": median " << d.quantile(0.5) << ", p99 " << d.quantile(0.99)
@@ -336,7 +337,7 @@ TEST_CASE("wrenchd's kernels and CGAL meet the same contacts at borders, ribs an
   long contacts = 0, touching = 0;
   for (const Case& c : cases) {
     const Scene scene = against(c.tool, c.surface, BodyKind::surface);
-    const ManipulationCase handling = {c.name, {}, {}, HandMotion::slide, c.start_m};
+    const ManipulationCase handling = {c.name, {}, {}, Handling::slide, c.start_m};
     SweepComparison comparison(scene);
     Proxy proxy(scene);
     HandTrajectory hand(handling);
@@ -442,4 +443,4 @@ TEST_CASE("a stab at 23 m/s does not pass through an open sheet from either side
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_surface_contacts

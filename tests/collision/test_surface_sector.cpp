@@ -9,7 +9,8 @@
 #include "collision/surface_sector.hpp"
 #include "tests/support/pocket_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_surface_sector {
+
 namespace {
 
 constexpr double kOver_m = 1e-9, kClearance_m = 1e-9;
@@ -89,4 +90,4 @@ TEST_CASE("beyond the border of an open sheet nothing rises", "[surface_sector]"
   CHECK_FALSE(is_behind_end(sheet, edge_between(sheet, 0, 1), -Vector3d::UnitY(), {-1e-9, 0, 0}, 1e-9));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_surface_sector

@@ -11,7 +11,8 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_tool_body {
+
 namespace {
 
 using namespace test;
@@ -198,4 +199,4 @@ TEST_CASE("an unusable tool is rejected with its file and the remedy") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_tool_body

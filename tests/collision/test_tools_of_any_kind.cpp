@@ -11,7 +11,8 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_tools_of_any_kind {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -207,4 +208,4 @@ TEST_CASE("a tool of parts meets a set of solids, and is never inside", "[tool]"
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_tools_of_any_kind

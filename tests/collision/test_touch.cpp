@@ -11,7 +11,8 @@
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_touch {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -165,3 +166,5 @@ TEST_CASE("features and obstacles have names", "[touch]") {
   CHECK(obstacle_name(scene, 1) == "obstacle 1");
   CHECK(obstacle_name(scene, 7) == "obstacle 7");
 }
+
+}  // namespace wrenchd::test_touch

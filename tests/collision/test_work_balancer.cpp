@@ -3,7 +3,8 @@
 
 #include "collision/work_balancer.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_work_balancer {
+
 namespace {
 
 WorkBalancer after(int ticks, std::uint32_t sweep_visits, double list) {
@@ -86,4 +87,4 @@ TEST_CASE("a reset discards the estimates", "[work_balancer]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_work_balancer

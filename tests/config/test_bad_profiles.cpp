@@ -8,7 +8,8 @@
 #include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_bad_profiles {
+
 namespace {
 
 /// Four valid profiles, one of each kind. Each row of the table below changes one of them.
@@ -502,4 +503,4 @@ TEST_CASE("a hundred invalid profiles are rejected with location and remedy", "[
   }
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_bad_profiles

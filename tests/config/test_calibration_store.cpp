@@ -22,7 +22,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_calibration_store {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -380,4 +381,4 @@ TEST_CASE("a disk that is full, or a directory that is locked, leaves the old ca
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_calibration_store

@@ -14,7 +14,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_config {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -368,4 +369,4 @@ TEST_CASE("a hand script with one waypoint keeps the hand at rest", "[config]") 
   CHECK(s.hand_path[0].position_m == Vector3d(0.0, 0.0, 0.1));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_config

@@ -15,7 +15,8 @@
 #include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_config_rejections {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -493,4 +494,4 @@ TEST_CASE("a configuration in place of a scene, or the reverse, is named as what
   CHECK(sections >= 9);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_config_rejections

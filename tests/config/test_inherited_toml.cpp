@@ -6,7 +6,7 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_inherited_toml {
 
 using Catch::Contains;
 using test::TemporaryDirectory;
@@ -108,4 +108,4 @@ TEST_CASE("defects of a parent are reported with their location in the parent", 
   CHECK(message.find(child.string()) < message.find(parent.string()));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_inherited_toml

@@ -5,7 +5,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_known_profiles {
+
 namespace {
 
 using namespace test;
@@ -54,4 +55,4 @@ TEST_CASE("without profile files the list is empty", "[known_profiles]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_known_profiles

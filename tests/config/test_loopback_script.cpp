@@ -5,7 +5,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_loopback_script {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -192,4 +193,4 @@ TEST_CASE("a script requires a simulated device that supports its faults", "[loo
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_loopback_script

@@ -4,7 +4,8 @@
 #include "config/near_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_near_file {
+
 namespace {
 
 using test::TemporaryDirectory;
@@ -45,4 +46,4 @@ TEST_CASE("names without a file have no near file", "[near_file]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_near_file

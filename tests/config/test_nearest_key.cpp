@@ -5,7 +5,8 @@
 
 #include "config/nearest_key.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_nearest_key {
+
 namespace {
 
 KnownKey key(const std::string& name) {
@@ -92,4 +93,4 @@ TEST_CASE("a mistyped name has the nearest name, upper and lower case alike", "[
   CHECK(nearest_name("gear", {}) == "");
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_nearest_key

@@ -7,7 +7,8 @@
 
 #include "config/pose_table.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_pose_table {
+
 namespace {
 
 const std::string kHeader = "px,py,pz,qx,qy,qz,qw\n";
@@ -210,4 +211,4 @@ TEST_CASE("a message quotes only a short part of an invalid file") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_pose_table

@@ -17,7 +17,7 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_profiles {
 
 namespace {
 
@@ -315,3 +315,5 @@ TEST_CASE("a firmware requires a serial chip that loads it", "[profiles]") {
                     Catch::Contains("mine.toml:5") && Catch::Contains("serial_chip = \"ftdi\""));
   CHECK_THROWS_WITH(load("serial_chip = \"prolific\"\n"), Catch::Contains("ftdi"));
 }
+
+}  // namespace wrenchd::test_profiles

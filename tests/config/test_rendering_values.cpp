@@ -7,7 +7,8 @@
 #include "config/rendering_values.hpp"
 #include "config/setting_table.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_rendering_values {
+
 namespace {
 
 const RenderingValue& value_named(const std::string& name) {
@@ -81,4 +82,4 @@ TEST_CASE("changed values are those that differ", "[rendering_values]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_rendering_values

@@ -5,7 +5,8 @@
 #include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scene_bodies {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -129,4 +130,4 @@ TEST_CASE("a free body with an error is rejected with its place and the remedy",
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene_bodies

@@ -6,7 +6,8 @@
 #include "config/toml_file.hpp"
 #include "tests/support/paths.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scene_text {
+
 namespace {
 
 using Catch::Contains;
@@ -114,4 +115,4 @@ TEST_CASE("a motion that ends is left out of the text of a scene, at the pose of
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene_text

@@ -5,7 +5,7 @@
 #include "config/search_path.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_search_path {
 
 using test::TemporaryDirectory;
 
@@ -66,4 +66,4 @@ TEST_CASE("a profile is named with or without the extension of its file", "[sear
   CHECK(profile_file("mine/device.toml") == "mine/device.toml");
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_search_path

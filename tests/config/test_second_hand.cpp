@@ -12,7 +12,8 @@
 #include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_second_hand {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -179,4 +180,4 @@ TEST_CASE("two hands that may open the same device are rejected", "[second_hand]
   CHECK(rejection_of(polhem + kLeft, {{}, {}, "polhem", true}).empty());  // simulated
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_second_hand

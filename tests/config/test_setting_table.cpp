@@ -11,7 +11,8 @@
 #include "config/toml_file.hpp"
 #include "tests/support/paths.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_setting_table {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -123,4 +124,4 @@ TEST_CASE("a limit is a number, so a reload can report the value that still appl
     if (setting.effect == Setting::Effect::limits) CHECK(setting.number != nullptr);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_setting_table

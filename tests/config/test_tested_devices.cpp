@@ -9,7 +9,8 @@
 #include "config/tested_devices.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_tested_devices {
+
 using namespace wrenchd::test;
 namespace fs = std::filesystem;
 
@@ -64,3 +65,5 @@ TEST_CASE("a test that cannot be remembered names the directory", "[tested_devic
   CHECK_THROWS_WITH(TestedDevices(blocked / "tested").add(kDevice),
                     Catch::Matchers::Contains(blocked.string()));
 }
+
+}  // namespace wrenchd::test_tested_devices

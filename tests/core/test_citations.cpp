@@ -16,6 +16,8 @@
 
 #include "tests/support/paths.hpp"
 
+namespace wrenchd::test_citations {
+
 // Checks the citations of the tree: METHOD (22) and sections of core/METHOD.md, Eq. (8) and sections of the
 // paper, names of Markdown files, links of the guides.
 
@@ -386,3 +388,5 @@ TEST_CASE("links of the guides lead to files and headings", "[citations]") {
   }
   CHECK(links > 50);
 }
+
+}  // namespace wrenchd::test_citations

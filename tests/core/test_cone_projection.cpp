@@ -10,7 +10,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_cone_projection {
+
 namespace {
 
 using Cones = std::vector<FrictionCone>;
@@ -197,4 +198,4 @@ TEST_CASE("a solve of cones does not allocate", "[cone_projection]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_cone_projection

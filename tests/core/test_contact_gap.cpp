@@ -6,7 +6,8 @@
 #include "core/contact_gap.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_contact_gap {
+
 using test::RandomValues;
 
 namespace {
@@ -176,3 +177,5 @@ TEST_CASE("the curvature of several contacts with one normal is that of their su
     CHECK((together.C - apart.C).norm() < 1e-12);
   }
 }
+
+}  // namespace wrenchd::test_contact_gap

@@ -8,7 +8,8 @@
 #include "core/convex_body.hpp"
 #include "tests/support/random_body.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_convex_body {
+
 using namespace wrenchd::test;
 
 TEST_CASE("a box has six faces, twelve edges and no diagonal", "[convex_body]") {
@@ -92,3 +93,5 @@ TEST_CASE("an edge is touched by planes whose normals lie between those of its f
     }
   }
 }
+
+}  // namespace wrenchd::test_convex_body

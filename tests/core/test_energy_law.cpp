@@ -12,7 +12,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_energy_law {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -192,3 +193,5 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
   CHECK(worst < 1e-6);
   CHECK(worst_pid > 1e-3);  // otherwise the comparison is empty
 }
+
+}  // namespace wrenchd::test_energy_law

@@ -6,7 +6,7 @@
 
 #include "core/fault.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_fault {
 
 TEST_CASE("every fault has a unique name, a detector, a message, a reason and a remedy", "[fault]") {
   std::set<std::string> names, sentences;
@@ -56,3 +56,5 @@ TEST_CASE("an invalid fault value is named unknown", "[fault]") {
     REQUIRE_FALSE(row.cure.empty());
   }
 }
+
+}  // namespace wrenchd::test_fault

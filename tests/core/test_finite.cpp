@@ -10,7 +10,8 @@
 #include "core/finite.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_finite {
+
 using test::RandomValues;
 
 namespace {
@@ -83,3 +84,5 @@ TEST_CASE("a vector with one component that is not finite is not finite", "[fini
     }
   }
 }
+
+}  // namespace wrenchd::test_finite

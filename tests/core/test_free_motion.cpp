@@ -5,7 +5,8 @@
 
 #include "core/free_motion.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_free_motion {
+
 namespace {
 
 const Inertia kThreeMoments = {0.3, Vector3d(2e-4, 3e-4, 4.5e-4).asDiagonal()};
@@ -78,4 +79,4 @@ TEST_CASE("a symmetric top precesses about its angular momentum", "[free_motion]
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_free_motion

@@ -17,7 +17,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_friction {
+
 namespace {
 
 using namespace test;
@@ -479,4 +480,4 @@ TEST_CASE("only method exact supports friction; the other methods reject it", "[
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_friction

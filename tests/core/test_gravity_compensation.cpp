@@ -9,7 +9,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_gravity_compensation {
+
 namespace {
 
 using namespace test;
@@ -184,4 +185,4 @@ TEST_CASE("gravity compensation neither allocates nor locks", "[gravity]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_gravity_compensation

@@ -4,7 +4,8 @@
 #include "core/hessian.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_hessian {
+
 using test::RandomValues;
 
 namespace {
@@ -64,3 +65,5 @@ TEST_CASE("a Hessian that is singular up to rounding has no factor", "[hessian]"
   h.B(0, 2) = h.B(2, 0) = h.B(0, 1) * h.B(1, 2) / h.B(1, 1);
   CHECK_FALSE(factorise(h, factor));
 }
+
+}  // namespace wrenchd::test_hessian

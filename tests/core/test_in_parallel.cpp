@@ -11,7 +11,7 @@
 
 #include "core/in_parallel.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_in_parallel {
 
 TEST_CASE("each number is worked on once, whatever the number of threads", "[in_parallel]") {
   for (const std::size_t count : {0, 1, 2, 7, 1000})
@@ -61,3 +61,5 @@ TEST_CASE("a thread is started only for enough work, and for a processor", "[in_
   CHECK(threads_for(199, 100) == 1);
   CHECK(threads_for(1'000'000, 100) == std::max(std::thread::hardware_concurrency(), 1U));
 }
+
+}  // namespace wrenchd::test_in_parallel

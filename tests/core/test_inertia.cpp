@@ -8,7 +8,8 @@
 #include "core/inertia.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_inertia {
+
 using test::RandomValues;
 
 namespace {
@@ -271,3 +272,5 @@ TEST_CASE("a mesh without a volume is reported", "[inertia]") {
   not_a_number.vertices_m[3].y() = std::nan("");
   CHECK_FALSE(solid_properties(not_a_number, 1.0).volume_m3 > 0.0);
 }
+
+}  // namespace wrenchd::test_inertia

@@ -5,7 +5,7 @@
 
 #include "core/lag_limiter.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_lag_limiter {
 
 TEST_CASE("a proxy that keeps up is not limited", "[lag_limiter]") {
   LagLimiter limiter;
@@ -51,3 +51,5 @@ TEST_CASE("a new proxy begins without energy", "[lag_limiter]") {
   limiter.reset();
   CHECK(limiter.scale(1.0, true) == 0.0);
 }
+
+}  // namespace wrenchd::test_lag_limiter

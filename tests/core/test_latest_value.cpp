@@ -8,7 +8,7 @@
 
 #include "core/latest_value.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_latest_value {
 
 namespace {
 
@@ -116,3 +116,5 @@ TEST_CASE("in two directions at once each thread takes the newest value of the o
   echo.join();
   CHECK(wrong == 0);
 }
+
+}  // namespace wrenchd::test_latest_value

@@ -10,7 +10,8 @@
 #include "core/least_distance.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_least_distance {
+
 using test::RandomValues;
 
 namespace {
@@ -380,3 +381,5 @@ TEST_CASE("one solver object solves several problems in turn", "[least_distance]
     REQUIRE(reused.z() == fresh.z());
   }
 }
+
+}  // namespace wrenchd::test_least_distance

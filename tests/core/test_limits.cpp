@@ -15,7 +15,8 @@
 #include "tests/support/limit_cases.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_limits {
+
 using test::RandomValues;
 
 namespace {
@@ -479,3 +480,5 @@ TEST_CASE("a million random ticks satisfy every invariant of the oracle", "[limi
   INFO(untouched << " cases went out as they came");
   CHECK(untouched > kCases / 100);
 }
+
+}  // namespace wrenchd::test_limits

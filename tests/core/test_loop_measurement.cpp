@@ -10,7 +10,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_loop_measurement {
+
 using test::RandomValues;
 
 namespace {
@@ -179,3 +180,5 @@ TEST_CASE("measuring allocates nothing", "[loop_measurement][rt]") {
   measured.reset();
   CHECK(guard.allocations() + guard.locks() == 0);
 }
+
+}  // namespace wrenchd::test_loop_measurement

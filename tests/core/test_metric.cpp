@@ -9,7 +9,8 @@
 #include "tests/support/pose_matrix.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_metric {
+
 using std::numbers::pi;
 using test::matrix;
 using test::RandomValues;
@@ -247,3 +248,5 @@ TEST_CASE("example 4.1: the energy between the paper's p and q", "[metric]") {
   CHECK(eps[1] == Approx(2.05106566).epsilon(1e-8));
   CHECK(eps[5] == Approx(0.11328538).epsilon(1e-7));
 }
+
+}  // namespace wrenchd::test_metric

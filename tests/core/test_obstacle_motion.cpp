@@ -8,7 +8,8 @@
 #include "core/finite.hpp"
 #include "core/obstacle_motion.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_obstacle_motion {
+
 namespace {
 
 constexpr double kDay_s = 86400.0;
@@ -117,4 +118,4 @@ TEST_CASE("a periodic motion depends on the time since its start", "[motion]") {
     CHECK(apart(later.pose_at(kStart, t), kToAndFro.pose_at(kStart, t - 3.0)) < 1e-12);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_obstacle_motion

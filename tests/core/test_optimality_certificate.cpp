@@ -6,7 +6,8 @@
 #include "core/optimality_certificate.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_optimality_certificate {
+
 using test::RandomValues;
 
 namespace {
@@ -101,3 +102,5 @@ TEST_CASE("the dual bound is met if and only if the Lagrangian is convex in the 
     CHECK_FALSE(meets_dual_bound(hessian));
   }
 }
+
+}  // namespace wrenchd::test_optimality_certificate

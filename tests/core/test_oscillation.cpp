@@ -11,7 +11,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_oscillation {
+
 using test::RandomValues;
 
 namespace {
@@ -195,3 +196,5 @@ TEST_CASE("the detector allocates nothing", "[oscillation][rt]") {
   detector.reset();
   CHECK(guard.allocations() + guard.locks() == 0);
 }
+
+}  // namespace wrenchd::test_oscillation

@@ -14,7 +14,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_passivity {
+
 using test::RandomValues;
 
 namespace {
@@ -406,3 +407,5 @@ TEST_CASE("work of moving obstacles: pushing adds credit; withdrawing removes it
   guard.credit(-1.0);
   CHECK(push(0.0, 0.0) <= 1e-3);
 }
+
+}  // namespace wrenchd::test_passivity

@@ -11,7 +11,8 @@
 #include "core/planar_family.hpp"
 #include "tests/support/random_body.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_planar_family {
+
 using namespace wrenchd::test;
 using std::numbers::pi;
 
@@ -423,3 +424,5 @@ TEST_CASE("a translation of the world changes no result of the family", "[planar
     }
   }
 }
+
+}  // namespace wrenchd::test_planar_family

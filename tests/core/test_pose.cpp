@@ -10,7 +10,8 @@
 #include "tests/support/pose_matrix.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_pose {
+
 using std::numbers::pi;
 using test::matrix;
 using test::RandomValues;
@@ -278,3 +279,5 @@ TEST_CASE("p exp(xi) p^-1 = exp(Ad_p xi)", "[pose]") {
     REQUIRE(distance(p * exp(xi) * inverse(p), exp(moved)) <= 2e-14 * (1.0 + moved.norm()));
   }
 }
+
+}  // namespace wrenchd::test_pose

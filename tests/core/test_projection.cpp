@@ -8,7 +8,8 @@
 #include "core/projection.hpp"
 #include "tests/support/overlapping_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_projection {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -400,3 +401,5 @@ TEST_CASE("balance finds the multipliers of an optimum and the pull that no cont
     CHECK(beside.kkt_residual < 1.0);
   }
 }
+
+}  // namespace wrenchd::test_projection

@@ -10,7 +10,8 @@
 #include "core/quartic.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_quartic {
+
 using test::RandomValues;
 
 namespace {
@@ -458,3 +459,5 @@ TEST_CASE("pure powers", "[quartic]") {
   CHECK(with_zero.x[0] == 0.0);
   CHECK(with_zero.x[1] == Approx(3.0).epsilon(1e-15));
 }
+
+}  // namespace wrenchd::test_quartic

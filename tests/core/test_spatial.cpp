@@ -5,7 +5,8 @@
 #include "core/spatial.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_spatial {
+
 using test::RandomValues;
 
 namespace {
@@ -138,3 +139,5 @@ TEST_CASE("changes of point and axes together are the adjoint transformation, ME
     REQUIRE(distance(F_A, Wrench{F_by_matrix.head<3>(), F_by_matrix.tail<3>()}) <= 2e-14);
   }
 }
+
+}  // namespace wrenchd::test_spatial

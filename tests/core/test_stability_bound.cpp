@@ -14,7 +14,8 @@
 #include "devices/simulation/simulated_handle.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_stability_bound {
+
 using test::RandomValues;
 
 namespace {
@@ -245,3 +246,5 @@ TEST_CASE("the stiffest spring beside a damper just satisfies the inequality", "
     }
   }
 }
+
+}  // namespace wrenchd::test_stability_bound

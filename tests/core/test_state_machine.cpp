@@ -4,7 +4,8 @@
 #include "core/state_machine.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_state_machine {
+
 using test::RandomValues;
 
 namespace {
@@ -244,3 +245,5 @@ TEST_CASE("for random triggers: force in four states only, a rise in one only, l
   }
   for (const int times : seen) CHECK(times > 100);
 }
+
+}  // namespace wrenchd::test_state_machine

@@ -3,6 +3,8 @@
 
 #include "core/static_vector.hpp"
 
+namespace wrenchd::test_static_vector {
+
 using wrenchd::StaticVector;
 
 TEST_CASE("a static vector stores up to its capacity, and a copy is independent", "[fixed_list]") {
@@ -32,3 +34,5 @@ TEST_CASE("a static vector stores up to its capacity, and a copy is independent"
   list.clear();
   CHECK(list.begin() == list.end());
 }
+
+}  // namespace wrenchd::test_static_vector

@@ -12,7 +12,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_thermal {
+
 using test::RandomValues;
 
 namespace {
@@ -233,3 +234,5 @@ TEST_CASE("heat and limits together: the wrench follows the limit, with the caus
   CHECK(out.F.force_N.norm() == Approx(4.0).epsilon(1e-12));
   CHECK(out.causes == (kForceMagnitude | kForceThermal));
 }
+
+}  // namespace wrenchd::test_thermal

@@ -7,7 +7,8 @@
 #include "core/fault.hpp"
 #include "tests/support/expected_machine.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_transitions {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -90,3 +91,5 @@ TEST_CASE("every state can be entered and left", "[transitions]") {
       for (std::size_t t = 0; t < kTriggerCount; ++t) reached.insert(after(static_cast<Trigger>(t), from));
   CHECK(reached.size() == kStateCount);
 }
+
+}  // namespace wrenchd::test_transitions

@@ -7,7 +7,8 @@
 #include "core/undriven_motion.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_undriven_motion {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -243,3 +244,5 @@ TEST_CASE("no energy counts while no force reaches the hand", "[undriven]") {
   }
   CHECK(undriven.account_J() == 0.0);
 }
+
+}  // namespace wrenchd::test_undriven_motion

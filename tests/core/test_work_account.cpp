@@ -10,7 +10,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_work_account {
+
 namespace {
 
 using namespace test;
@@ -257,4 +258,4 @@ TEST_CASE("an account does not allocate", "[work_account]") {
   CHECK(locks == 0);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_work_account

@@ -7,7 +7,8 @@
 #include "core/wrench_law.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_wrench_law {
+
 using std::numbers::pi;
 using test::RandomValues;
 
@@ -311,3 +312,5 @@ TEST_CASE("the work of a wrench does not depend on its point", "[wrench_law]") {
     REQUIRE(stacked(spatial_wrench(p, W_T)).dot(V_S) == Approx(stacked(W_T).dot(V_T)).margin(5e-14));
   }
 }
+
+}  // namespace wrenchd::test_wrench_law

@@ -5,7 +5,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/shipped_config.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_clear_start {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -51,3 +52,5 @@ TEST_CASE("a scene in which the simulated hand would start inside an obstacle gi
   REQUIRE(at != std::string::npos);
   CHECK(std::stod(run.out.substr(at + words.size())) > 0.5);
 }
+
+}  // namespace wrenchd::test_clear_start

@@ -10,7 +10,8 @@
 #include "daemon/option_checks.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_command_line {
+
 namespace {
 
 using Catch::Contains;
@@ -105,4 +106,4 @@ TEST_CASE("a file of the command line that does not exist has the nearest file",
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_command_line

@@ -5,7 +5,8 @@
 
 #include "daemon/contact_rate.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_contact_rate {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -68,3 +69,5 @@ TEST_CASE("a short run is reported at its end", "[contact_rate]") {
   CHECK(report.close(timing));
   CHECK_FALSE(report.close(timing));
 }
+
+}  // namespace wrenchd::test_contact_rate

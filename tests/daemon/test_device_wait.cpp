@@ -9,7 +9,8 @@
 #include "core/clock.hpp"
 #include "daemon/device_wait.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_device_wait {
+
 namespace {
 
 /// Captures the log during its lifetime.
@@ -71,4 +72,4 @@ TEST_CASE("each rejected device is logged once, and once more after it is connec
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_device_wait

@@ -29,10 +29,11 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_first_test {
+
 // The test of a device before it is armed for the first time, with the firmware reference of
 // devices/firmware/ as it is, and with the mistakes of a maker around it.
 
-using namespace wrenchd;
 using namespace wrenchd::test;
 using Catch::Contains;
 
@@ -341,3 +342,5 @@ TEST_CASE("wrenchd arms no arm in another process whose force is inverted", "[fi
     wrenchd.wait();
   }
 }
+
+}  // namespace wrenchd::test_first_test

@@ -9,7 +9,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_guide_line {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -42,4 +43,4 @@ TEST_CASE("the help of a program in the build tree ends with the README of the s
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_guide_line

@@ -3,7 +3,7 @@
 
 #include "daemon/hand_file.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_hand_file {
 
 TEST_CASE("a file of the second hand has its name before the extension", "[hand_file]") {
   CHECK(file_of_hand("/run/wrenchd/control.sock", "left") == "/run/wrenchd/control-left.sock");
@@ -16,4 +16,4 @@ TEST_CASE("files of the first hand keep their names", "[hand_file]") {
   CHECK(file_of_hand("", "left").empty());
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_hand_file

@@ -7,7 +7,9 @@
 #include "daemon/hand_scenes.hpp"
 #include "tests/support/two_hands.hpp"
 
-namespace wrenchd::test {
+namespace wrenchd::test_hand_scenes {
+
+using namespace test;
 
 using Catch::Contains;
 
@@ -53,4 +55,4 @@ TEST_CASE("two hands need the exact method, and the message says so", "[hand_sce
   CHECK_THROWS_WITH(TwoHands(configs), Contains("two hands act in the scene") && Contains("[[hand]]"));
 }
 
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_hand_scenes

@@ -10,7 +10,8 @@
 #include "daemon/event_journal.hpp"
 #include "daemon/journal.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_journal {
+
 namespace {
 
 std::string field(const JournalFieldList& fields, const std::string& name) {
@@ -82,4 +83,4 @@ TEST_CASE("the three message ids have 128 bits and differ", "[journal]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_journal

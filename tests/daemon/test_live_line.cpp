@@ -4,7 +4,8 @@
 #include "core/state.hpp"
 #include "daemon/live_line.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_live_line {
+
 namespace {
 
 using Catch::Contains;
@@ -59,4 +60,4 @@ TEST_CASE("the summary has the totals of the loop: every tick, not samples of th
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_live_line

@@ -7,7 +7,8 @@
 #include "daemon/live_view.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_live_view {
+
 namespace {
 
 using namespace test;
@@ -55,4 +56,4 @@ TEST_CASE("a live view without an output prints nothing", "[live_view]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_live_view

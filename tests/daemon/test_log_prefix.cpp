@@ -5,7 +5,7 @@
 
 #include "daemon/log_prefix.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_log_prefix {
 
 TEST_CASE("log lines of a thread begin with the name of the hand as long as the prefix lives",
           "[log_prefix]") {
@@ -25,4 +25,4 @@ TEST_CASE("log lines of a thread begin with the name of the hand as long as the 
   CHECK(LogPrefix::current().empty());
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_log_prefix

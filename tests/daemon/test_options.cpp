@@ -9,7 +9,8 @@
 #include "daemon/options.hpp"
 #include "tests/support/paths.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_options {
+
 namespace {
 
 using Catch::Contains;
@@ -81,4 +82,4 @@ TEST_CASE("options that the device does not support are rejected with the remedy
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_options

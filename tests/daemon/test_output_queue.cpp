@@ -11,7 +11,8 @@
 
 #include "daemon/output_queue.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_output_queue {
+
 namespace {
 
 /// An output that waits until the test lets it go, as a write to a pipe whose reader has stopped does.
@@ -104,4 +105,4 @@ TEST_CASE("an output that throws does not end the thread", "[output_queue]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_output_queue

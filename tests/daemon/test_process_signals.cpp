@@ -14,7 +14,8 @@
 #include "daemon/process_signals.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_process_signals {
+
 namespace {
 
 using namespace test;
@@ -221,4 +222,4 @@ TEST_CASE("an exception that nobody handles releases the hand before the process
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_process_signals

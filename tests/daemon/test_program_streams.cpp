@@ -21,10 +21,11 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_program_streams {
+
 // The daemon with standard streams that are closed, that nobody reads any more, or that somebody has stopped
 // reading.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -168,4 +169,4 @@ TEST_CASE("a recording that reaches the limit of the file size ends, the run goe
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_program_streams

@@ -4,7 +4,8 @@
 #include "daemon/run_context.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_run_context {
+
 namespace {
 
 using namespace test;
@@ -24,4 +25,4 @@ TEST_CASE("a run reports the fault of a latched loop until its acknowledgement",
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_run_context

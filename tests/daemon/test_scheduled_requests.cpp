@@ -4,7 +4,8 @@
 #include "daemon/scheduled_requests.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scheduled_requests {
+
 namespace {
 
 using namespace test;
@@ -48,4 +49,4 @@ TEST_CASE("a scheduled command is sent at its time, and once", "[scheduled_reque
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scheduled_requests

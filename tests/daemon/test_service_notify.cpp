@@ -14,7 +14,8 @@
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_service_notify {
+
 namespace {
 
 using namespace test;
@@ -242,4 +243,4 @@ TEST_CASE("wrenchd without a device is ready, and reports what it waits for", "[
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_service_notify

@@ -7,7 +7,8 @@
 #include "daemon/control/worker_queue.hpp"
 #include "daemon/thread_guard.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_thread_guard {
+
 namespace {
 
 TEST_CASE("a step that throws ends alone, whatever it throws", "[thread_guard]") {
@@ -29,4 +30,4 @@ TEST_CASE("a task that throws does not end the worker", "[thread_guard]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_thread_guard

@@ -14,9 +14,10 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/soon.hpp"
 
+namespace wrenchd::test_two_hands {
+
 // wrenchd with two simulated hands.
 
-namespace wrenchd {
 namespace {
 
 namespace fs = std::filesystem;
@@ -302,4 +303,4 @@ TEST_CASE("a second hand that cannot start ends the first one too", "[two_hands]
   CHECK_THAT(result.err, Contains("run-left.h5"));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_two_hands

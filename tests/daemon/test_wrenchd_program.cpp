@@ -5,7 +5,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_wrenchd_program {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -268,4 +269,4 @@ TEST_CASE("wrenchd prints help and version") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_wrenchd_program

@@ -7,7 +7,8 @@
 #include "tests/support/polhem_in_hand.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_calibrated_profile {
+
 namespace {
 
 using namespace test;
@@ -74,4 +75,4 @@ TEST_CASE("homing asks only for the axes that the device senses", "[calibrated_p
   CHECK(homing_plan(profile).sensed == std::array<bool, 6>{true, true, true, false, false, false});
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_calibrated_profile

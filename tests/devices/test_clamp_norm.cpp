@@ -3,7 +3,7 @@
 
 #include "devices/clamp_norm.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_clamp_norm {
 
 TEST_CASE("a vector longer than its limit keeps its direction, a shorter one its bits", "[clamp_norm]") {
   const Eigen::Vector3d v(3.0, -4.0, 12.0);  // norm 13
@@ -13,3 +13,5 @@ TEST_CASE("a vector longer than its limit keeps its direction, a shorter one its
   CHECK(clamp_norm(v, 0.0) == Eigen::Vector3d::Zero());
   CHECK(clamp_norm(Eigen::Vector3d::Zero(), 0.0) == Eigen::Vector3d::Zero());
 }
+
+}  // namespace wrenchd::test_clamp_norm

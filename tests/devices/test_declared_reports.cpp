@@ -4,7 +4,7 @@
 #include "devices/declared_reports.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_declared_reports {
 
 using namespace test;
 
@@ -31,4 +31,4 @@ TEST_CASE("without a valid descriptor nothing is declared", "[declared_reports]"
   CHECK_FALSE(DeclaredReports(Bytes{0x75}).contains(Bytes{1, 2}));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_declared_reports

@@ -17,7 +17,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_deflection_pose {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -395,3 +396,5 @@ TEST_CASE("the simulated hand observes the displayed tool and steers it along it
   CHECK(pressed_m < 0.011);
   CHECK(farthest_m < 0.020);
 }
+
+}  // namespace wrenchd::test_deflection_pose

@@ -4,7 +4,8 @@
 #include "devices/device_homing.hpp"
 #include "tests/support/polhem_in_hand.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_device_homing {
+
 namespace {
 
 using namespace test;
@@ -123,4 +124,4 @@ TEST_CASE("a device with absolute encoders needs no reference pose at the start"
   CHECK(homing.state().step == HomingStep::done);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_device_homing

@@ -14,7 +14,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_homing {
+
 namespace {
 
 bool is_done(const Homing& homing) {
@@ -536,4 +537,4 @@ TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_homing

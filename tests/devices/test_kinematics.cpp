@@ -9,7 +9,7 @@
 #include "devices/kinematics.hpp"
 #include "tests/support/paths.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_kinematics {
 
 namespace {
 
@@ -199,3 +199,5 @@ TEST_CASE("the offset of a button is removed from its count", "[kinematics]") {
   CHECK(strip_count_button(kPolhem, counts, buttons) == counts);
   CHECK(buttons == 0xf0);
 }
+
+}  // namespace wrenchd::test_kinematics

@@ -9,7 +9,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_layout_check {
+
 namespace {
 
 using namespace test;
@@ -214,4 +215,4 @@ TEST_CASE("wrenchctl check --against prints the required changes", "[layout_chec
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_layout_check

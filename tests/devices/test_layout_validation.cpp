@@ -6,7 +6,7 @@
 #include "devices/layout_validation.hpp"
 #include "tests/support/report_round_trip.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_layout_validation {
 
 TEST_CASE("the reference layouts are valid") {
   CHECK(validation_error(kPose).empty());
@@ -53,3 +53,5 @@ TEST_CASE("an invalid layout is rejected with the fields and the byte") {
   wrench.force.step = 0.0;
   CHECK_THAT(validation_error(wrench), Contains("force needs a finite step"));
 }
+
+}  // namespace wrenchd::test_layout_validation

@@ -6,7 +6,8 @@
 #include "devices/pose_spline.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_pose_spline {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -95,3 +96,5 @@ TEST_CASE("an invalid recorded path is rejected", "[pose_spline]") {
   CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(std::nan(""), 0.1)}), Contains("not finite"));
   CHECK(PoseSpline({turned(0.0, 0.5)}).at(from_seconds(3.0)).X_BG.rotation.x() == Approx(std::sin(0.25)));
 }
+
+}  // namespace wrenchd::test_pose_spline

@@ -14,7 +14,8 @@
 #include "devices/report_codec.hpp"
 #include "devices/simulation/reference_profile.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_profile_device {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -720,3 +721,5 @@ TEST_CASE("a report that the device declares and the profile does not need is no
                                   bench.now);  // a report of the profile, damaged
   CHECK(bench.step().rejected == 1);
 }
+
+}  // namespace wrenchd::test_profile_device

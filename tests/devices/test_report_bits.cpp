@@ -10,7 +10,7 @@
 #include "devices/report_bits.hpp"
 #include "tests/support/report_round_trip.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_report_bits {
 
 TEST_CASE("integers of every width are little-endian two's complement and clamp at their range") {
   struct Width {
@@ -138,3 +138,5 @@ TEST_CASE("a field has an offset and a signed step") {
   CHECK(force_round_trip(layout, {10.0, 9.5, -117.5}) == Vector3d(10.0, 9.5, -117.5));
   CHECK(force_round_trip(layout, {11.0, -200.0, 0.0}) == Vector3d(10.0, -117.5, 0.0));
 }
+
+}  // namespace wrenchd::test_report_bits

@@ -14,7 +14,7 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/report_round_trip.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_report_codec {
 
 namespace {
 
@@ -151,3 +151,5 @@ TEST_CASE("a pose may arrive in parts") {
   CHECK(decode_into(orientation, bytes, received) == Decoding::bad_checksum);
   CHECK(received.X_BH.rotation.coeffs() == before.X_BH.rotation.coeffs());
 }
+
+}  // namespace wrenchd::test_report_codec

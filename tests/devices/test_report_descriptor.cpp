@@ -5,7 +5,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_report_descriptor {
+
 namespace {
 
 using namespace test;
@@ -338,4 +339,4 @@ TEST_CASE("a million mutated and random descriptors are fully accepted or reject
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_report_descriptor

@@ -10,7 +10,7 @@
 #include "devices/report_frame.hpp"
 #include "tests/support/report_round_trip.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_report_frame {
 
 TEST_CASE("CRC-16/CCITT-FALSE has its published check value") {
   const std::string digits = "123456789";
@@ -95,3 +95,5 @@ TEST_CASE("a report may be as short as its minimum length, and no shorter") {
   CHECK(decode(layout, std::span(bytes).first(2)).outcome == Decoding::wrong_length);
   CHECK(decode(layout, std::span(bytes)).outcome == Decoding::wrong_length);
 }
+
+}  // namespace wrenchd::test_report_frame

@@ -7,7 +7,8 @@
 #include "devices/six_axes.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_six_axes {
+
 namespace {
 
 using namespace test;
@@ -120,4 +121,4 @@ TEST_CASE("a device without six axes is rejected with the reason", "[six_axes]")
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_six_axes

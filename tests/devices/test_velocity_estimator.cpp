@@ -14,7 +14,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_velocity_estimator {
+
 namespace {
 
 using namespace test;
@@ -246,4 +247,4 @@ TEST_CASE("an update allocates nothing", "[velocity][realtime]") {
   CHECK(guard.locks() == 0);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_velocity_estimator

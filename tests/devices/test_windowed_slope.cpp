@@ -8,7 +8,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_windowed_slope {
+
 namespace {
 
 using namespace test;
@@ -119,4 +120,4 @@ TEST_CASE("at 8 kHz the samples span the longest window", "[velocity][realtime]"
   CHECK(slope.window_s() > 0.9 * WindowedSlope::kMaxWindow_s);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_windowed_slope

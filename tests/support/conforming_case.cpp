@@ -14,7 +14,6 @@
 namespace wrenchd::test {
 namespace {
 
-constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
 constexpr double kShaft_m = 0.0099, kShaftLength_m = 0.060, kBoreLength_m = 0.050;
 constexpr double kGearRadius_m = 0.021, kGearLength_m = 0.010;
 constexpr double kTeeth = 20.0;

@@ -5,14 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <numbers>
 #include <ostream>
 #include <string>
 
 namespace wrenchd::test {
 namespace {
-
-constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
 
 using Polygon = std::vector<Vector3d>;
 

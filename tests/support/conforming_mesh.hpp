@@ -4,11 +4,14 @@
 #include <cstdint>
 #include <functional>
 #include <iosfwd>
+#include <numbers>
 #include <vector>
 
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd::test {
+
+inline constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
 
 /// A polygon around the z axis at one height. Corner i is at angle 2 pi i / corners.
 struct ProfileRing {

@@ -12,7 +12,7 @@ namespace wrenchd::test {
 namespace {
 
 constexpr double kMost = std::numeric_limits<double>::max();
-constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+constexpr double kDenormal = std::numeric_limits<double>::denorm_min();
 constexpr std::uint64_t kTicksEach = 64;  ///< number of ticks per device
 
 }  // namespace
@@ -42,7 +42,7 @@ double LimitCases::any_double() noexcept {
     case 0:
       return sign * 0.0;
     case 1:
-      return sign * kLeast * static_cast<double>(bits() % 9);
+      return sign * kDenormal * static_cast<double>(bits() % 9);
     case 2:
       return sign * power_of_two(-1074, -1000);
     case 3:

@@ -62,8 +62,8 @@ V3 nearest(V3 v, V3 last) {
 /// Tolerance relative to the limit. Each operation on doubles rounds by 1.1e-16; the workspace edge subtracts
 /// nearly equal distances.
 constexpr Real kRounding = 1e-13L;
-constexpr Real kDirected = 1e-290L;  // denormal numbers have too few digits for a direction
-constexpr Real kLeast = 1e-320L;     // limits this small are a few of the smallest denormal steps
+constexpr Real kDirected = 1e-290L;       // denormal numbers have too few digits for a direction
+constexpr Real kSmallestLimit = 1e-320L;  // limits this small are a few of the smallest denormal steps
 
 struct Group {
   const char* name;
@@ -75,9 +75,9 @@ struct Group {
 std::string broken(const Group& g) {
   const auto is = [&](const char* what) { return std::string(g.name) + ": " + what; };
   const Real out = size(g.out), asked = size(g.asked);
-  const Real slack = kRounding * g.maximum + kLeast;
+  const Real slack = kRounding * g.maximum + kSmallestLimit;
   const Real limit = g.maximum < g.ceiling ? g.maximum : g.ceiling;
-  if (out > limit * (1 + 1e-15L) + kLeast) return is("I2 longer than its limit");
+  if (out > limit * (1 + 1e-15L) + kSmallestLimit) return is("I2 longer than its limit");
 
   Real most = asked < limit ? asked : limit;
   most *= g.share;

@@ -7,7 +7,7 @@
 namespace wrenchd::test {
 
 const std::vector<ManipulationCase>& manipulation_cases() {
-  using enum HandMotion;
+  using enum Handling;
   static const std::vector<ManipulationCase> all = {
       {"cube through a plate", {"cube", 12}, {"plate", 12}, stab, {0, 0, 0.05}},
       {"fine cube through a fine plate", {"cube", 1200}, {"plate", 5000}, stab, {0, 0, 0.05}},
@@ -53,16 +53,16 @@ const Pose& HandTrajectory::next() {
   ++ticks_;
   t_s_ += 1e-3;
   switch (case_.motion) {
-    case HandMotion::stab:
+    case Handling::stab:
       stab();
       break;
-    case HandMotion::shake:
+    case Handling::shake:
       shake();
       break;
-    case HandMotion::press:
+    case Handling::press:
       press();
       break;
-    case HandMotion::slide:
+    case Handling::slide:
       slide();
       break;
   }

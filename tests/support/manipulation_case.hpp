@@ -12,7 +12,7 @@
 namespace wrenchd::test {
 
 /// How a hand moves a tool, at 1000 poses per second.
-enum class HandMotion : std::uint8_t {
+enum class Handling : std::uint8_t {
   stab,   ///< straight through the obstacle and back at up to 5 m/s, with a small rotation
   shake,  ///< random motion at up to 5 m/s and 50 rad/s
   press,  ///< in a hole: lateral motion, tilt, and motion along the hole
@@ -23,7 +23,7 @@ enum class HandMotion : std::uint8_t {
 struct ManipulationCase {
   std::string name;
   GeneratedMesh tool, obstacle;
-  HandMotion motion;
+  Handling motion;
   Vector3d start_m;  ///< start position of the tool, without overlap
   BodyKind obstacle_kind = BodyKind::solid;
 };

@@ -5,7 +5,8 @@
 #include "tests/support/run_program.hpp"
 #include "tools/calibrate.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_calibrate {
+
 namespace {
 
 using namespace test;
@@ -101,4 +102,4 @@ TEST_CASE("wrenchctl calibrate rejects devices that it cannot calibrate") {
   }
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_calibrate

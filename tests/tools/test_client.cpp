@@ -13,7 +13,8 @@
 #include "tests/support/soon.hpp"
 #include "tests/support/stub_daemon.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_client {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -243,3 +244,5 @@ TEST_CASE("the example prints wrench and contacts", "[client]") {
   CHECK(alone.exit_code == 1);
   CHECK(alone.err.find("no wrenchd responds (") == 0);
 }
+
+}  // namespace wrenchd::test_client

@@ -7,7 +7,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/completion_names.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_completion_names {
+
 namespace {
 
 std::vector<std::string> names(const std::string& kind, const std::string& name = {}) {
@@ -42,4 +43,4 @@ TEST_CASE("every kind of the completion is known, and no other", "[completion_na
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_completion_names

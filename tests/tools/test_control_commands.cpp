@@ -8,9 +8,10 @@
 #include "tests/support/run_program.hpp"
 #include "tools/control_commands.hpp"
 
+namespace wrenchd::test_control_commands {
+
 // wrenchctl and the daemon as two processes.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -246,4 +247,4 @@ TEST_CASE("any operator can disarm a daemon that its command line armed", "[cont
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_control_commands

@@ -7,7 +7,8 @@
 #include "tools/doctor.hpp"
 #include "tools/udev_rules.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_doctor {
+
 namespace {
 
 using namespace test;
@@ -207,4 +208,4 @@ TEST_CASE("wrenchctl doctor checks this machine; its exit code reports failures"
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_doctor

@@ -7,7 +7,8 @@
 #include "daemon/servo/record_fields.hpp"
 #include "tools/export_recording.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_export_recording {
+
 using Catch::Matchers::Contains;
 
 namespace {
@@ -70,3 +71,5 @@ TEST_CASE("a part of a recording is exported", "[export]") {
 TEST_CASE("an unknown column is rejected with the most similar name", "[export]") {
   CHECK_THROWS_WITH(lines_of({.columns = {"F_oot"}}), Contains("no column 'F_oot'") && Contains("F_out"));
 }
+
+}  // namespace wrenchd::test_export_recording

@@ -4,7 +4,8 @@
 #include "core/fault.hpp"
 #include "tools/fault_text.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_fault_text {
+
 using Catch::Matchers::Contains;
 
 TEST_CASE("the fault text contains every fault with reaction and remedy", "[fault_text]") {
@@ -32,3 +33,5 @@ TEST_CASE("the state machine is printed row by row", "[fault_text]") {
   CHECK_THAT(text,
              Contains("hard fault") && Contains("a user must acknowledge before force is possible again"));
 }
+
+}  // namespace wrenchd::test_fault_text

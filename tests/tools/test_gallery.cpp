@@ -16,10 +16,13 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/gallery.hpp"
 
+namespace wrenchd::test_gallery {
+
+using namespace test;
+
 // Runs every scene of the gallery once through its hand script: no fault, no overlap, and the figures that
 // its description states.
 
-namespace wrenchd::test {
 namespace {
 
 /// Maximum duration of a script under sanitizers, which are many times slower.
@@ -255,4 +258,4 @@ TEST_CASE("tools/run rejects an unknown gallery name with the list of names", "[
 }
 
 }  // namespace
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_gallery

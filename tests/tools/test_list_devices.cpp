@@ -11,7 +11,8 @@
 #include "tests/support/sample_descriptors.hpp"
 #include "tools/list_devices.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_list_devices {
+
 namespace {
 
 using namespace test;
@@ -359,4 +360,4 @@ TEST_CASE("wrenchctl devices without a connected device", "[list_devices]") {
 #endif
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_list_devices

@@ -9,7 +9,8 @@
 #include "tests/support/running_daemon.hpp"
 #include "tools/live_scene.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_live_scene {
+
 namespace {
 
 using namespace test;
@@ -159,4 +160,4 @@ TEST_CASE("wrenchctl scene load finds files as the other commands do, and reset 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_live_scene

@@ -7,7 +7,8 @@
 #include "tests/support/running_daemon.hpp"
 #include "tools/live_settings.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_live_settings {
+
 namespace {
 
 using namespace test;
@@ -178,4 +179,4 @@ TEST_CASE("wrenchctl set applies all changes, or none", "[live_settings]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_live_settings

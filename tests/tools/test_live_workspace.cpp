@@ -5,7 +5,8 @@
 #include "tests/support/running_daemon.hpp"
 #include "tools/live_workspace.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_live_workspace {
+
 namespace {
 
 using namespace test;
@@ -36,4 +37,4 @@ TEST_CASE("wrenchctl workspace shows and changes scale and clutch", "[live_works
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_live_workspace

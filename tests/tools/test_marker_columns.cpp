@@ -3,7 +3,7 @@
 
 #include "tools/marker_columns.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_marker_columns {
 
 TEST_CASE("conditions hold until a marker changes them", "[export]") {
   Recording recording;
@@ -27,3 +27,5 @@ TEST_CASE("conditions hold until a marker changes them", "[export]") {
   add(40, "d", "[1]");
   CHECK_THROWS_WITH(MarkerColumns(recording), Catch::Contains("the marker 'd' are not a JSON object"));
 }
+
+}  // namespace wrenchd::test_marker_columns

@@ -5,7 +5,7 @@
 
 #include "tools/mat_file.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_mat_file {
 
 // tests/exports reads whole exports with scipy; here is what every reader relies on.
 TEST_CASE("elements of a MAT-file have multiples of 8 bytes, and the size that their tag states",
@@ -25,3 +25,5 @@ TEST_CASE("elements of a MAT-file have multiples of 8 bytes, and the size that t
     CHECK(element[0] == 14);
   }
 }
+
+}  // namespace wrenchd::test_mat_file

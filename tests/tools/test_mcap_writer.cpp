@@ -7,7 +7,7 @@
 
 #include "tools/mcap_writer.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_mcap_writer {
 
 namespace {
 
@@ -51,3 +51,5 @@ TEST_CASE("an MCAP file has its records in order, and its lengths and checksums 
   crc.process_bytes(file.data(), data_end);
   CHECK(number_at(file, data_end + 9, 4) == crc.checksum());
 }
+
+}  // namespace wrenchd::test_mcap_writer

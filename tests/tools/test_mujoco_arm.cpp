@@ -16,9 +16,10 @@
 #include "tests/support/soon.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_mujoco_arm {
+
 using namespace std::chrono_literals;
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -73,4 +74,4 @@ TEST_CASE("a robot arm in MuJoCo acts on the hand, and its death in contact leav
   CHECK(smallest_J > -1e-6);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mujoco_arm

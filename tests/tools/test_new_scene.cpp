@@ -13,7 +13,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/new_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_new_scene {
+
 using namespace wrenchd::test;
 namespace fs = std::filesystem;
 
@@ -106,3 +107,5 @@ TEST_CASE("a rejected new scene leaves nothing behind", "[new_scene]") {
   CHECK(rejected(part, part).find("exists already") != std::string::npos);
   CHECK(rejected(dir.path(), part).find("exists already") != std::string::npos);
 }
+
+}  // namespace wrenchd::test_new_scene

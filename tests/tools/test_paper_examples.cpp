@@ -3,7 +3,7 @@
 
 #include "tools/paper_examples.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_paper_examples {
 
 TEST_CASE("example 4.1 is the paper's: p, and a cube of 50 by 50 by 50", "[paper]") {
   const Vector6d xi_p = log(pose_of_example_4_1(1.0));
@@ -54,3 +54,5 @@ TEST_CASE("between contacts the cube of example 4.2 moves as a free body does", 
   }
   CHECK(free > 30);
 }
+
+}  // namespace wrenchd::test_paper_examples

@@ -13,7 +13,8 @@
 #include "tools/paper_examples.hpp"
 #include "tools/paper_figures.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_paper_figures {
+
 using Catch::Matchers::Contains;
 
 namespace {
@@ -82,3 +83,5 @@ TEST_CASE("figures that cannot be written or drawn are rejected with a remedy", 
   setenv("PATH", path.c_str(), 1);
   CHECK(lines_of(directory / "fig15.csv").size() == 121);
 }
+
+}  // namespace wrenchd::test_paper_figures

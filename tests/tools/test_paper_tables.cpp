@@ -7,7 +7,7 @@
 
 #include "tools/paper_tables.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_paper_tables {
 
 TEST_CASE("all numbers of the paper except two of Eq. (47) are reproduced to their last digit", "[paper]") {
   std::istringstream lines(paper_tables());
@@ -32,3 +32,5 @@ TEST_CASE("the tables contain more digits than the paper", "[paper]") {
   for (const char* digits : {"9.631542185", "-0.086714620", "270.712157436", "-0.296066223", "4.4684"})
     CHECK(text.find(digits) != std::string::npos);
 }
+
+}  // namespace wrenchd::test_paper_tables

@@ -11,7 +11,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/plot_recording.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_plot_recording {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -98,3 +99,5 @@ TEST_CASE("a recording that cannot be plotted is rejected with a remedy", "[plot
   CHECK_THROWS_WITH(plot_recording(pressed(), file), Contains("is not a directory") && Contains(".svg"));
   CHECK_THROWS_WITH(plot_recording(pressed(), file / "x.png"), Contains("cannot be written"));
 }
+
+}  // namespace wrenchd::test_plot_recording

@@ -19,7 +19,8 @@
 #include "tests/support/sample_descriptors.hpp"
 #include "tools/propose_profile.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_propose_profile {
+
 namespace {
 
 using namespace test;
@@ -455,4 +456,4 @@ TEST_CASE("wrenchctl profile rejects invalid sources with location and remedy", 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_propose_profile

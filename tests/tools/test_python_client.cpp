@@ -16,6 +16,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/stub_daemon.hpp"
 
+namespace wrenchd::test_python_client {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -140,3 +142,5 @@ TEST_CASE("the Python programs in the guide are the examples", "[python]") {
     CHECK(guide.find(printed) != std::string::npos);
   }
 }
+
+}  // namespace wrenchd::test_python_client

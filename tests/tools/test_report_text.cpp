@@ -8,7 +8,8 @@
 #include "tests/support/paths.hpp"
 #include "tools/report_text.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_report_text {
+
 using Catch::Contains;
 using Catch::StartsWith;
 
@@ -152,3 +153,5 @@ TEST_CASE("bytes are parsed in all usual notations", "[report_text]") {
   CHECK_FALSE(parse_bytes("01 a").error.empty());
   CHECK_FALSE(parse_bytes("0x").error.empty());
 }
+
+}  // namespace wrenchd::test_report_text

@@ -6,7 +6,7 @@
 
 #include "tools/tick_selection.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_tick_selection {
 
 TEST_CASE("components of every field have a name, a unit and an exact text", "[export]") {
   TickRecord tick;
@@ -31,3 +31,5 @@ TEST_CASE("components of every field have a name, a unit and an exact text", "[e
   CHECK(text("state", 0) == "state 200 enum");
   CHECK(real_component(selected_fields({.columns = {"F_out"}})[0], &tick, 3) == 1e300);
 }
+
+}  // namespace wrenchd::test_tick_selection

@@ -8,7 +8,8 @@
 #include "tests/support/run_program.hpp"
 #include "tools/udev_rules.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_udev_rules {
+
 namespace {
 
 using namespace test;
@@ -157,4 +158,4 @@ TEST_CASE("a name that would begin a rule of its own makes no rules", "[udev_rul
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_udev_rules

@@ -11,7 +11,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_wrenchctl {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -1089,4 +1090,4 @@ TEST_CASE("wrenchctl prints its help") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_wrenchctl

@@ -8,7 +8,8 @@
 #include "collision/meshes/make_mesh.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_body_proxy {
+
 namespace {
 
 constexpr double kTick_s = 1e-3;
@@ -151,4 +152,4 @@ TEST_CASE("a tick of a body proxy does not allocate", "[body_proxy]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_body_proxy

@@ -15,7 +15,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_body_world {
+
 namespace {
 
 constexpr double kStep_s = 1e-3;
@@ -334,4 +335,4 @@ TEST_CASE("with its work used up a world stays as it was and is admissible", "[b
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_body_world

@@ -13,7 +13,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_grasp {
+
 namespace {
 
 constexpr double kStep_s = 1e-3;
@@ -233,4 +234,4 @@ TEST_CASE("a step with a grasp can be taken back, and allocates nothing", "[gras
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_grasp

@@ -12,7 +12,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_impacts {
+
 namespace {
 
 constexpr double kStep_s = 1e-3;
@@ -234,4 +235,4 @@ TEST_CASE("a step in which bodies rebound neither allocates nor locks", "[impact
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_impacts

@@ -14,7 +14,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_two_tools {
+
 namespace {
 
 constexpr double kTick_s = 1e-3;  // of each hand; the hands take turns
@@ -302,4 +303,4 @@ TEST_CASE("random motions of two hands: no overlap, no energy from the scheme, n
   CHECK(h.allocations == 0);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_two_tools

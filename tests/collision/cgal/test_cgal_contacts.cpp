@@ -13,7 +13,8 @@
 #include "tests/support/gallery_comparison.hpp"
 #include "tests/support/sweep_comparison.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_cgal_contacts {
+
 namespace {
 
 using namespace test;
@@ -84,7 +85,7 @@ TEST_CASE("wrenchd's kernels and CGAL meet the same contacts", "[cgal_contacts]"
     handling.obstacle_kind = kind;
     INFO(handling.name << (kind == BodyKind::surface ? ", as a surface" : ""));
     // A tool that is shaken begins beside the obstacle and reaches it later.
-    const int ticks = handling.motion == HandMotion::shake ? 150 : 40;
+    const int ticks = handling.motion == Handling::shake ? 150 : 40;
     const SweepCounts counts = compare_sweeps(handling, case_count(ticks), kRandomPaths, 7);
     INFO(counts.first_difference);
     CHECK(counts.different == 0);
@@ -187,4 +188,4 @@ TEST_CASE("the gallery has the same proxy with contacts = \"cgal\"", "[cgal_cont
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_cgal_contacts

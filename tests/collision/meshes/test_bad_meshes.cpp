@@ -13,10 +13,11 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_bad_meshes {
+
 // Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or rejected
 // with its name, the location and the remedy.
 
-namespace wrenchd {
 namespace {
 
 namespace fs = std::filesystem;
@@ -356,4 +357,4 @@ TEST_CASE("240 bad meshes are accepted, repaired with a report, or rejected with
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_bad_meshes

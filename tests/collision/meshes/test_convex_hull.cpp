@@ -12,7 +12,7 @@
 #include "collision/meshes/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_convex_hull {
 
 namespace {
 
@@ -99,3 +99,5 @@ TEST_CASE("the hull of a flat sheet has a volume", "[convex_hull]") {
   CHECK(volume(hull) > 0.0);
   CHECK(outside_m(sheet, hull) < 1e-15);
 }
+
+}  // namespace wrenchd::test_convex_hull

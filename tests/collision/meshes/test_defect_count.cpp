@@ -3,7 +3,8 @@
 
 #include "collision/meshes/defect_count.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_defect_count {
+
 namespace {
 
 TEST_CASE("a defect count reports the first defect and the number", "[defect_count]") {
@@ -28,4 +29,4 @@ TEST_CASE("a defect count reports the first defect and the number", "[defect_cou
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_defect_count

@@ -6,7 +6,8 @@
 #include "collision/meshes/half_edges.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_half_edges {
+
 namespace {
 
 using namespace test;
@@ -38,4 +39,4 @@ TEST_CASE("every half-edge is listed, grouped by edge", "[half_edges]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_half_edges

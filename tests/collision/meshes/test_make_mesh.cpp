@@ -11,7 +11,8 @@
 #include "core/inertia.hpp"
 #include "tests/support/exact_intersection.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_make_mesh {
+
 namespace {
 
 PolygonSoup soup_of(const TriangleMesh& mesh) {
@@ -140,4 +141,4 @@ TEST_CASE("an OFF file reads back to the bit", "[make_mesh]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_make_mesh

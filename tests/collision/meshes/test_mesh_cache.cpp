@@ -6,7 +6,8 @@
 #include "collision/meshes/mesh_cache.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_cache {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -136,4 +137,4 @@ TEST_CASE("the cache directory follows the system or the user", "[mesh_cache]") 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_cache

@@ -8,7 +8,8 @@
 #include "core/inertia.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_check {
+
 namespace {
 
 using namespace test;
@@ -382,4 +383,4 @@ TEST_CASE("coordinates at the end of their range cause no crash") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_check

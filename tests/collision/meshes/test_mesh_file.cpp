@@ -12,7 +12,8 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_file {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -464,4 +465,4 @@ TEST_CASE("a valid file with modified bytes is read or rejected without a crash"
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_file

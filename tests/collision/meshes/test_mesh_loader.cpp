@@ -10,7 +10,8 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_loader {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -285,4 +286,4 @@ TEST_CASE("numbers have thousands separators", "[mesh_loader]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_loader

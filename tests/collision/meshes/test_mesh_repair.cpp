@@ -10,7 +10,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/sample_meshes.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_repair {
+
 namespace {
 
 using namespace test;
@@ -352,4 +353,4 @@ TEST_CASE("a defect that needs a guess is left unchanged", "[mesh_repair]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_repair

@@ -20,7 +20,7 @@
 #include "core/inertia.hpp"
 #include "tests/support/case_count.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_mesh_simplifier {
 
 namespace {
 
@@ -215,3 +215,5 @@ TEST_CASE("the tolerance follows single precision and the size", "[mesh_simplifi
   CHECK(simplification_tolerance_m(cube, 1e-6) > 5e-6);  // 100 m from the origin
   CHECK(simplification_tolerance_m(TriangleMesh{}, 1e-6) == 0.0);
 }
+
+}  // namespace wrenchd::test_mesh_simplifier

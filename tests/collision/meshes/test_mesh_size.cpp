@@ -5,7 +5,8 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/meshes/mesh_size.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_size {
+
 namespace {
 
 /// A cube of 50 mm.
@@ -52,4 +53,4 @@ TEST_CASE("a size outside the range of contact queries is rejected", "[mesh_size
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_size

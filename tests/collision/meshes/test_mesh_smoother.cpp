@@ -14,7 +14,8 @@
 #include "collision/meshes/mesh_smoother.hpp"
 #include "tests/support/paths.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_smoother {
+
 namespace {
 
 constexpr Smoothing kMost = {1e-3, 100'000};
@@ -159,4 +160,4 @@ TEST_CASE("a large mesh is divided less", "[mesh_smoother]") {
   CHECK(smooth.mesh.triangles.size() > large.triangles.size());
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_smoother

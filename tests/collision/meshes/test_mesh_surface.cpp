@@ -12,7 +12,8 @@
 #include "collision/meshes/mesh_surface.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_surface {
+
 namespace {
 
 using namespace test;
@@ -257,4 +258,4 @@ TEST_CASE("the border of an open mesh counts as an edge with one face", "[mesh_s
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_surface

@@ -9,7 +9,8 @@
 #include "collision/meshes/mesh_union.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_mesh_union {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -102,3 +103,5 @@ TEST_CASE("parts that touch in many places are one body or stay apart, and nothi
   CHECK(united > 0);
   CHECK(apart > 0);
 }
+
+}  // namespace wrenchd::test_mesh_union

@@ -3,7 +3,8 @@
 
 #include "collision/meshes/packer.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_packer {
+
 namespace {
 
 TEST_CASE("packed values are unpacked, and missing values are detected", "[packer]") {
@@ -36,4 +37,4 @@ TEST_CASE("packed values are unpacked, and missing values are detected", "[packe
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_packer

@@ -12,7 +12,7 @@
 #include "collision/meshes/make_mesh.hpp"
 #include "collision/meshes/self_intersection.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_self_intersection {
 
 namespace {
 
@@ -61,3 +61,5 @@ TEST_CASE("spheres that do not touch do not intersect", "[self_intersection]") {
   append(mesh, make_mesh({"sphere", 40'000}), {1.0, 0.0, 0.0});
   CHECK_FALSE(intersects_itself(mesh));
 }
+
+}  // namespace wrenchd::test_self_intersection

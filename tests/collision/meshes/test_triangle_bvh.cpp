@@ -8,7 +8,8 @@
 #include "collision/meshes/triangle_bvh.hpp"
 #include "tests/support/case_count.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_triangle_bvh {
+
 namespace {
 
 using Kind = MeshSurface::Kind;
@@ -129,4 +130,4 @@ TEST_CASE("a BVH without triangles is empty", "[triangle_bvh]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_triangle_bvh

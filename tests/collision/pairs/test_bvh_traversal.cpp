@@ -10,7 +10,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_bvh_traversal {
+
 namespace {
 
 using namespace test;
@@ -154,4 +155,4 @@ TEST_CASE("a traversal stops at the end of its budget and reports it", "[bvh_tra
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_bvh_traversal

@@ -9,7 +9,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_candidate_pairs {
+
 namespace {
 
 using namespace test;
@@ -167,4 +168,4 @@ TEST_CASE("a list with a moving obstacle covers its times and its relative path"
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_candidate_pairs

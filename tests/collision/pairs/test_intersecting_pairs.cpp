@@ -8,7 +8,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_intersecting_pairs {
+
 namespace {
 
 using namespace test;
@@ -106,4 +107,4 @@ TEST_CASE("a mesh without triangles intersects nothing", "[intersecting_pairs]")
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_intersecting_pairs

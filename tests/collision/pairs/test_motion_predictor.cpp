@@ -4,7 +4,8 @@
 #include "collision/pairs/motion_predictor.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_motion_predictor {
+
 namespace {
 
 using namespace test;
@@ -80,4 +81,4 @@ TEST_CASE("a deferred tick predicts the tool where it would have moved", "[motio
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_motion_predictor

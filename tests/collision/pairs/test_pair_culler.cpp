@@ -12,7 +12,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_pair_culler {
+
 namespace {
 
 using namespace test;
@@ -227,4 +228,4 @@ TEST_CASE("the culler tests all pairs that were added", "[pair_culler]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_pair_culler

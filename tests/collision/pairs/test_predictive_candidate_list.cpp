@@ -8,7 +8,8 @@
 #include "collision/pairs/predictive_candidate_list.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_predictive_candidate_list {
+
 namespace {
 
 using namespace test;
@@ -53,8 +54,7 @@ TEST_CASE("uniform motion needs no immediate list", "[predictive_candidate_list]
 // The unit is node visits, not time. If the prefetch were left to the end, or an immediate list were long,
 // one tick would have ten times the work of the others.
 TEST_CASE("the work for prefetched lists is spread over the ticks", "[predictive_candidate_list]") {
-  const Scene scene =
-      scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, Handling::slide, {}});
   const auto inside = [](int i) {  // many pairs are near
     return Pose{pose_on_path(i).rotation, pose_on_path(i).translation_m - Vector3d(0.003, 0, 0)};
   };
@@ -141,8 +141,7 @@ TEST_CASE("a used list is not used again", "[predictive_candidate_list]") {
 // For some ticks no work is available for the next list, until the current one expires.
 TEST_CASE("an immediate list takes precedence over a prefetched list that cannot be completed in time",
           "[predictive_candidate_list]") {
-  const Scene scene =
-      scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, Handling::slide, {}});
   const auto round = [](int i) {
     const double angle = 2e-3 * i;
     return Pose{rotation_from(Vector3d(0, 0, -angle)), 0.1 * Vector3d(std::cos(angle), std::sin(angle), 0)};
@@ -296,4 +295,4 @@ TEST_CASE("a pending list is discarded if the path leads elsewhere", "[predictiv
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_predictive_candidate_list

@@ -6,7 +6,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_separating_axes {
+
 namespace {
 
 using namespace test;
@@ -97,4 +98,4 @@ TEST_CASE("triangles without area are never separated wrongly", "[separating_axe
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_separating_axes

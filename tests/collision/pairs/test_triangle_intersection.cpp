@@ -5,7 +5,8 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_triangle_intersection {
+
 namespace {
 
 using namespace test;
@@ -50,4 +51,4 @@ TEST_CASE("coplanar triangles intersect if they overlap", "[triangle_intersectio
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_triangle_intersection

@@ -6,7 +6,8 @@
 #include "core/files/absolute_name.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_absolute_name {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,4 +30,4 @@ TEST_CASE("a name stays relative in a working directory that does not exist any 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_absolute_name

@@ -13,7 +13,8 @@
 #include "core/files/opened_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_opened_file {
+
 namespace {
 
 using namespace test;
@@ -141,4 +142,4 @@ TEST_CASE("a name that changes between a FIFO, a link and a file gives the file 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_opened_file

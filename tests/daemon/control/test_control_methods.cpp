@@ -8,7 +8,8 @@
 #include "config/setting_table.hpp"
 #include "tests/support/control_rig.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_control_methods {
+
 namespace {
 
 using namespace test;
@@ -210,4 +211,4 @@ TEST_CASE("a method or event cannot be added twice", "[control_methods]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_control_methods

@@ -14,7 +14,8 @@
 #include "tests/support/control_rig.hpp"
 #include "tests/support/rate_check.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_control_socket {
+
 namespace {
 
 /// A sanitizer keeps freed memory, and makes the socket's thread too slow for heartbeats.
@@ -779,4 +780,4 @@ TEST_CASE("the thread of an idle socket sleeps", "[control_socket]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_control_socket

@@ -3,7 +3,7 @@
 
 #include "daemon/control/event_description.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_event_description {
 
 namespace {
 
@@ -49,3 +49,5 @@ TEST_CASE("a latched fault is logged as an error, a passing fault as a warning",
   CHECK(describe({TimePoint{}, Event::FaultRaised{Fault::sample_late, 0.0}}).level == EventLevel::warning);
   CHECK(describe({TimePoint{}, Event::Released{}}).level == EventLevel::info);
 }
+
+}  // namespace wrenchd::test_event_description

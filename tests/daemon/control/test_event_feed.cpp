@@ -4,7 +4,8 @@
 #include "daemon/control/event_feed.hpp"
 #include "tests/support/control_rig.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_event_feed {
+
 namespace {
 
 using namespace test;
@@ -205,4 +206,4 @@ TEST_CASE("an error of the flight recorder does not end the feed, and the fault 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_event_feed

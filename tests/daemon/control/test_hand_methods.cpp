@@ -8,9 +8,10 @@
 #include "daemon/control/hand_methods.hpp"
 #include "tests/support/shipped_config.hpp"
 
+namespace wrenchd::test_hand_methods {
+
 using namespace std::chrono_literals;
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -100,4 +101,4 @@ TEST_CASE("hand.set says why a hand cannot be moved", "[hand_methods]") {
   CHECK(rejection(by_a_person, there).find("--simulate") != std::string::npos);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_hand_methods

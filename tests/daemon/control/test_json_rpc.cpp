@@ -4,7 +4,8 @@
 #include "daemon/control/json_rpc.hpp"
 #include "tests/support/request_line.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_json_rpc {
+
 namespace {
 
 RpcRequest request_of(const std::string& line) {
@@ -129,4 +130,4 @@ TEST_CASE("each response is one line of JSON-RPC, with any content", "[json_rpc]
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_json_rpc

@@ -4,7 +4,8 @@
 #include "daemon/control/lease.hpp"
 #include "tests/support/control_rig.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_lease {
+
 namespace {
 
 using namespace test;
@@ -166,4 +167,4 @@ TEST_CASE("a holder that arms again after it has disarmed is watched again", "[l
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_lease

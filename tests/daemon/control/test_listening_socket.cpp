@@ -12,7 +12,8 @@
 #include "daemon/control/listening_socket.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_listening_socket {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -260,4 +261,4 @@ TEST_CASE("the socket path is taken from command line, environment, configuratio
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_listening_socket

@@ -15,9 +15,10 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_reconfigurator {
+
 // The rendering changes while the hand is in contact.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -696,4 +697,4 @@ TEST_CASE("a change of rendering neither allocates nor locks in the servo thread
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_reconfigurator

@@ -20,7 +20,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_record_methods {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -249,3 +250,5 @@ TEST_CASE("wrenchctl replays, exports and plots a recording of wrenchd", "[recor
   CHECK(none.exit_code == 1);
   CHECK(none.err.find("none.h5: does not exist") != std::string::npos);
 }
+
+}  // namespace wrenchd::test_record_methods

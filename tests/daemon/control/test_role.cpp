@@ -9,7 +9,8 @@
 #include "daemon/control/listening_socket.hpp"
 #include "daemon/control/role.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_role {
+
 namespace {
 
 constexpr gid_t kObservers = 101, kOperators = 102, kAdministrators = 103, kOthers = 65534;
@@ -84,4 +85,4 @@ TEST_CASE("the kernel identifies the peer of a connection", "[role]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_role

@@ -5,7 +5,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_scene_cost {
+
 namespace {
 
 using namespace test;
@@ -56,4 +57,4 @@ TEST_CASE("ten million generated triangles are rejected before they are made", "
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene_cost

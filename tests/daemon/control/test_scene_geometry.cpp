@@ -12,7 +12,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tools/view/view_scene.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_scene_geometry {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -119,3 +120,5 @@ TEST_CASE("the view reads the scene of the daemon, and moves obstacles by scene 
   CHECK_THROWS_WITH(ViewScene(broken, geometry.bytes()),
                     Catch::Contains("the scene has an unknown format: "));
 }
+
+}  // namespace wrenchd::test_scene_geometry

@@ -9,10 +9,11 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace wrenchd::test_scene_methods {
+
 // Clients read and change the rendering: each request is looked up in the method table, with a role and
 // parameters in JSON.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -284,4 +285,4 @@ TEST_CASE("an observer can change nothing, and only an administrator can reload"
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_scene_methods

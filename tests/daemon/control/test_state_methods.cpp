@@ -8,7 +8,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_state_methods {
+
 namespace {
 
 using namespace test;
@@ -35,4 +36,4 @@ TEST_CASE("obstacle names come with the number of their rendering, also after a 
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_state_methods

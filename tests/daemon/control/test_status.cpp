@@ -6,7 +6,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_status {
+
 namespace {
 
 using namespace test;
@@ -106,4 +107,4 @@ TEST_CASE("the status has the last fault with the time of its tick", "[status]")
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_status

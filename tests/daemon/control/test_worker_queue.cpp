@@ -7,7 +7,8 @@
 
 #include "daemon/control/worker_queue.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_worker_queue {
+
 namespace {
 
 using Posted = WorkerQueue::Posted;
@@ -75,4 +76,4 @@ TEST_CASE("many observers leave places for higher roles", "[worker_queue]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_worker_queue

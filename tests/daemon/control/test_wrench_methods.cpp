@@ -8,9 +8,10 @@
 #include "daemon/control/wrench_methods.hpp"
 #include "tests/support/shipped_config.hpp"
 
+namespace wrenchd::test_wrench_methods {
+
 using namespace std::chrono_literals;
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -125,4 +126,4 @@ TEST_CASE("a profile whose wrench is about the world origin takes no external wr
   CHECK(contains(rig.rejection({{"force_N", {0.0, 0.0, 1.0}}}), "needs a wrench about the handle"));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_wrench_methods

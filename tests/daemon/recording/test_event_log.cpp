@@ -7,7 +7,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_event_log {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -91,3 +92,5 @@ TEST_CASE("events that left the history of the feed are counted in the recording
   CHECK(log.take(0).empty());  // its time is after the newest tick
   CHECK(log.take_all(0).size() == 1);
 }
+
+}  // namespace wrenchd::test_event_log

@@ -9,7 +9,8 @@
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_event_table {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -92,3 +93,5 @@ TEST_CASE("a recording without its events is rejected, and unfinished rows of ev
   }
   CHECK_THROWS_WITH(read_recording(file), Contains("has no table 'events'; name a recording of wrenchd"));
 }
+
+}  // namespace wrenchd::test_event_table

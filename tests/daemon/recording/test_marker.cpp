@@ -3,7 +3,8 @@
 
 #include "daemon/recording/marker.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_marker {
+
 using Catch::Matchers::Contains;
 
 TEST_CASE("a marker has a label of one line, and conditions that are numbers or texts", "[marker]") {
@@ -44,3 +45,5 @@ TEST_CASE("markers are limited to a burst, and to a rate over time", "[marker]")
   CHECK(admitted(1000.0, 1000.0, 1000) == 50);
   CHECK(admitted(900.0, 900.0, 10) == 0);  // a clock that goes back gives no credit
 }
+
+}  // namespace wrenchd::test_marker

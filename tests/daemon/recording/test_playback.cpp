@@ -12,7 +12,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_playback {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -180,3 +181,5 @@ TEST_CASE("wrenchd plays back the file of its command line", "[playback][program
   CHECK(real.exit_code == 1);
   CHECK(real.err.find("--playback: a person moves a real device") != std::string::npos);
 }
+
+}  // namespace wrenchd::test_playback

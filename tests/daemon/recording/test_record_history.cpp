@@ -3,7 +3,7 @@
 
 #include "daemon/recording/record_history.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_record_history {
 
 namespace {
 
@@ -65,3 +65,5 @@ TEST_CASE(
       REQUIRE(batch.contacts[batch.contact_ranges[i].first + t].obstacle == 100 * i + t);
   }
 }
+
+}  // namespace wrenchd::test_record_history

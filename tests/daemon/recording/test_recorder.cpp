@@ -4,7 +4,8 @@
 #include "daemon/recording/recorder.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_recorder {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -57,3 +58,5 @@ TEST_CASE("until the end only whole chunks are written; the end writes the rest"
   CHECK(recorder.write_next(history.stored_range().end, false));
   CHECK(recorder.written() == 4 * kChunk);
 }
+
+}  // namespace wrenchd::test_recorder

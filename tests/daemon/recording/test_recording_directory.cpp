@@ -11,7 +11,8 @@
 #include "daemon/recording/recording_directory.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_recording_directory {
+
 using namespace wrenchd::test;
 using Catch::Matchers::Contains;
 
@@ -185,3 +186,5 @@ TEST_CASE("only names that the flight recorder gives are removed as flights", "[
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(files.path())) ++left;
   CHECK(left == 5);
 }
+
+}  // namespace wrenchd::test_recording_directory

@@ -13,7 +13,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_recording_file {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -434,3 +435,5 @@ TEST_CASE("a recording that is being written, or that another program has locked
   CHECK_THAT(result.err, Catch::Contains("is still being written, or another program has locked it") &&
                              !Catch::Contains("damaged"));
 }
+
+}  // namespace wrenchd::test_recording_file

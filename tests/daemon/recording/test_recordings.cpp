@@ -16,7 +16,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_recordings {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Matchers::Contains;
@@ -426,3 +427,5 @@ TEST_CASE("a recording goes on when the working directory is removed", "[recordi
   std::filesystem::current_path(previous);
   CHECK(read_recording(files.path() / "mine.h5").ticks.size() == 3000);
 }
+
+}  // namespace wrenchd::test_recordings

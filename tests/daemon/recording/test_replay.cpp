@@ -12,7 +12,8 @@
 #include "tests/support/run_recorder.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_replay {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -302,3 +303,5 @@ TEST_CASE("a replay needs no file but the recording", "[replay]") {
   CHECK_THROWS_WITH(unpack_run_config(outside, directory.path() / "outside"),
                     Catch::Contains("cannot be read any more") && Catch::Contains("SHA-256"));
 }
+
+}  // namespace wrenchd::test_replay

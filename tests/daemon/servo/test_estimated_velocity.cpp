@@ -16,7 +16,8 @@
 #include "devices/velocity_estimator.hpp"
 #include "tests/support/emulated_run.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_estimated_velocity {
+
 namespace {
 
 using test::EmulatedRun;
@@ -187,4 +188,4 @@ TEST_CASE("the stability bound allows less damping on an estimated velocity", "[
   CHECK(scale_of(config.profile) == Approx(0.5 / kEstimateGain));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_estimated_velocity

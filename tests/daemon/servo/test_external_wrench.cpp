@@ -9,7 +9,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_external_wrench {
+
 namespace {
 
 using namespace test;
@@ -234,4 +235,4 @@ TEST_CASE("the loop allocates nothing for an external wrench", "[external_wrench
   CHECK(locks == 0);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_external_wrench

@@ -6,11 +6,14 @@
 #include "tests/support/expected_machine.hpp"
 #include "tests/support/fault_rig.hpp"
 
+namespace wrenchd::test_fault_reactions {
+
+using namespace test;
+
 // Every fault, in every state, with the hand in the air, in contact and at the limits. The loop raises the
 // fault in time and reacts as the safety requirements (tests/support/expected_machine.hpp) state. No tick
 // breaks an invariant.
 
-namespace wrenchd::test {
 namespace {
 
 /// Returns the number of ticks after which the force must be zero, from the tick that raises the fault.
@@ -167,4 +170,4 @@ TEST_CASE("a proxy without an admissible pose is a fault after three ticks", "[f
 }
 
 }  // namespace
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_fault_reactions

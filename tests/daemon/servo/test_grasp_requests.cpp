@@ -9,9 +9,12 @@
 #include "tests/support/gallery_run.hpp"
 #include "tests/support/shipped_config.hpp"
 
+namespace wrenchd::test_grasp_requests {
+
+using namespace test;
+
 // The tool holds a free body on request, or while a button is pressed, and reports it by events.
 
-namespace wrenchd::test {
 namespace {
 
 struct GraspEvent {
@@ -98,4 +101,4 @@ TEST_CASE("a grasp that broke is not taken again until it is asked for again", "
 }
 
 }  // namespace
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_grasp_requests

@@ -7,7 +7,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_local_models {
+
 namespace {
 
 using namespace test;
@@ -342,4 +343,4 @@ TEST_CASE("when there is no room left, a new model takes the place of the one th
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_local_models

@@ -7,7 +7,8 @@
 #include "daemon/servo/loop_timing.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_loop_timing {
+
 using namespace wrenchd::test;
 
 TEST_CASE("quantiles are right within 3 %, the maximum exactly", "[timing]") {
@@ -40,3 +41,5 @@ TEST_CASE("an empty histogram, and zero, negative and unlimited durations, have 
   CHECK(histogram.max() == Duration::max());
   CHECK(histogram.quantile(1.0) > std::chrono::minutes(15));
 }
+
+}  // namespace wrenchd::test_loop_timing

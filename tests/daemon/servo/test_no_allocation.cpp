@@ -14,7 +14,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_body.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_no_allocation {
+
 using namespace wrenchd::test;
 
 TEST_CASE("the guard counts allocations and locks", "[realtime]") {
@@ -158,3 +159,5 @@ TEST_CASE("following a hand around a convex body neither allocates nor locks", "
   CHECK(allocations == 0);
   CHECK(locks == 0);
 }
+
+}  // namespace wrenchd::test_no_allocation

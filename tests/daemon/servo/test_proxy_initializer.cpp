@@ -10,7 +10,8 @@
 #include "tests/support/buried_tool.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_proxy_initializer {
+
 namespace {
 
 using namespace test;
@@ -135,4 +136,4 @@ TEST_CASE("each progress value has a name", "[proxy_initializer]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_proxy_initializer

@@ -13,7 +13,8 @@
 #include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_realtime_watch {
+
 namespace {
 
 using namespace test;
@@ -96,4 +97,4 @@ TEST_CASE("a daemon whose servo thread lost its priority logs it, and disarms if
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_realtime_watch

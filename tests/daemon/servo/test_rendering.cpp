@@ -12,7 +12,10 @@
 #include "tests/support/gallery_run.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd::test {
+namespace wrenchd::test_rendering {
+
+using namespace test;
+
 namespace {
 
 constexpr double kTick_s = 1e-3;
@@ -172,4 +175,4 @@ TEST_CASE("following alone and among bodies does not allocate", "[rendering]") {
 }
 
 }  // namespace
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_rendering

@@ -7,7 +7,8 @@
 #include "daemon/servo/rendering_exchange.hpp"
 #include "tests/support/shipped_config.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_rendering_exchange {
+
 namespace {
 
 using namespace test;
@@ -86,4 +87,4 @@ TEST_CASE("between two threads no rendering is lost or taken twice", "[exchange]
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_rendering_exchange

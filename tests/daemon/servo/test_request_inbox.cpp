@@ -3,7 +3,7 @@
 
 #include "daemon/servo/request_inbox.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_request_inbox {
 
 TEST_CASE("commands accumulate until a tick takes them", "[request_inbox]") {
   RequestInbox inbox;
@@ -28,3 +28,5 @@ TEST_CASE("while arming is forbidden no request to arm reaches the loop, and all
   inbox.permit_arming(true);
   CHECK(inbox.take().commands == kArm);
 }
+
+}  // namespace wrenchd::test_request_inbox

@@ -3,7 +3,8 @@
 
 #include "daemon/servo/self_test.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_self_test {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -145,3 +146,5 @@ TEST_CASE("the timeout does not run before the device is homed", "[self_test]") 
   bench.sample.homed = true;
   CHECK(bench.ticks_until_passed(1000) > 500);
 }
+
+}  // namespace wrenchd::test_self_test

@@ -17,7 +17,8 @@
 #include "tests/support/buried_tool.hpp"
 #include "tests/support/paths.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_servo_loop {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -613,3 +614,5 @@ TEST_CASE("in wall time the loop runs at its rate, paced by the clock or by the 
   CHECK(runtime.loop().telemetry().timing().tick.count() > 10);
   CHECK(runtime.loop().telemetry().timing().tick.count() <= 600);  // with the fade
 }
+
+}  // namespace wrenchd::test_servo_loop

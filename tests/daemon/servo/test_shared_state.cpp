@@ -20,7 +20,8 @@
 #include "tests/support/random_values.hpp"
 #include "tests/support/shipped_config.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_shared_state {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -323,3 +324,5 @@ TEST_CASE("a layout that does not fit its memory is rejected", "[shared_state]")
   CHECK_THROWS_WITH(StateReader(good.dump(), unsealed), Catch::Contains("not sealed"));
   CHECK_THROWS_AS(StateReader("no JSON", fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0)), ClientError);
 }
+
+}  // namespace wrenchd::test_shared_state

@@ -8,7 +8,10 @@
 
 #include "tests/support/two_hands.hpp"
 
-namespace wrenchd::test {
+namespace wrenchd::test_shared_world {
+
+using namespace test;
+
 namespace {
 
 constexpr double kPlateWeight_N = 0.25 * 9.81;
@@ -121,4 +124,4 @@ TEST_CASE("two hands are deterministic", "[shared_world]") {
   }
 }
 
-}  // namespace wrenchd::test
+}  // namespace wrenchd::test_shared_world

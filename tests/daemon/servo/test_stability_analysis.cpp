@@ -6,7 +6,8 @@
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_stability_analysis {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -95,3 +96,5 @@ TEST_CASE("wrenchd scales a stiffness above the bound, and logs it", "[stability
   CHECK(result.err.find("scales the stiffness to") != std::string::npos);
   CHECK(result.out.find("in contact in 0 ticks") == std::string::npos);
 }
+
+}  // namespace wrenchd::test_stability_analysis

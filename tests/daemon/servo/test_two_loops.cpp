@@ -16,7 +16,8 @@
 #include "tests/support/simulated_hand.hpp"
 #include "tests/support/soon.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_two_loops {
+
 namespace {
 
 using namespace test;
@@ -182,4 +183,4 @@ TEST_CASE("one thread serves two hands in wall time, and each comes and goes by 
   CHECK(hands.second.state() == State::shutdown);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_two_loops

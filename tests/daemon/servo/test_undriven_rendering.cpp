@@ -14,7 +14,8 @@
 #include "core/state_machine.hpp"
 #include "tests/support/emulated_run.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_undriven_rendering {
+
 namespace {
 
 using test::EmulatedRun;
@@ -139,4 +140,4 @@ TEST_CASE("a closed path of a hand that feels three forces gives no work, in eit
   }
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_undriven_rendering

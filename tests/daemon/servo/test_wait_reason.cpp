@@ -14,7 +14,8 @@
 #include "devices/device.hpp"
 #include "tests/support/shipped_config.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_wait_reason {
+
 using namespace wrenchd::test;
 using Kind = WaitReason::Kind;
 
@@ -167,3 +168,5 @@ TEST_CASE("every state without force says why, and what changes that", "[wait_re
   profile.has_output = false;
   CHECK(text(State::active).find("no motors") != std::string::npos);
 }
+
+}  // namespace wrenchd::test_wait_reason

@@ -6,10 +6,11 @@
 #include "daemon/servo/watches.hpp"
 #include "daemon/servo/write_watch.hpp"
 
+namespace wrenchd::test_watches {
+
 // What tests/daemon/servo/test_fault_reactions.cpp does not see of the watches: where they must not find
 // anything.
 
-using namespace wrenchd;
 using namespace std::chrono_literals;
 
 namespace {
@@ -164,3 +165,5 @@ TEST_CASE("a closed connection of a client with a lease is a fault at once", "[w
   watch.start(TimePoint{2s});  // a new lease starts without a fault
   CHECK(watch.check(TimePoint{2s}) == 0);
 }
+
+}  // namespace wrenchd::test_watches

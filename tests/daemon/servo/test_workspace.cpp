@@ -4,7 +4,8 @@
 #include "daemon/servo/workspace.hpp"
 #include "tests/support/random_values.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_workspace {
+
 namespace {
 
 using namespace test;
@@ -93,4 +94,4 @@ TEST_CASE("recentring restores the configured base pose", "[workspace]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_workspace

@@ -26,10 +26,11 @@
 #include "tests/support/run_program.hpp"
 #include "tools/conform.hpp"
 
+namespace wrenchd::test_conformance {
+
 // wrenchctl conform against the firmware reference of devices/firmware/, as it is and with the mistakes of a
 // maker around it. The firmware itself has no switch for mistakes.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -469,4 +470,4 @@ TEST_CASE("wrenchctl conform rejects what it cannot check, with the remedy", "[c
   CHECK_THAT(node.err, Contains("/dev/null"));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_conformance

@@ -18,10 +18,11 @@
 #include "tests/support/firmware_mistakes.hpp"
 #include "tests/support/paths.hpp"
 
+namespace wrenchd::test_direction_check {
+
 // The check by pulses on the emulated arms of shipped profiles, with right and wrong profiles, and on the
 // firmware reference with the mistakes of a maker.
 
-namespace wrenchd {
 namespace {
 
 using namespace test;
@@ -200,4 +201,4 @@ TEST_CASE("velocities, sequences and acknowledgements are checked where the prof
   check_mistake("acknowledged", in_reports([](ReportBytes& r) { r[kAcknowledged] = 0; }));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_direction_check

@@ -6,10 +6,11 @@
 
 #include "devices/conformance/direction_pulses.hpp"
 
+namespace wrenchd::test_direction_pulses {
+
 // DirectionPulses against a free body whose motion is integrated here: M a = P F, with the mass matrix M and
 // the mistake P of a maker.
 
-namespace wrenchd {
 namespace {
 
 using Catch::Contains;
@@ -145,4 +146,4 @@ TEST_CASE("a pulse is at most a twentieth of the limits of the profile, and at m
   CHECK(pulse_torque_Nm(profile) == kMaxPulse_Nm);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_direction_pulses

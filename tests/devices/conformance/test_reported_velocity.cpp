@@ -8,7 +8,8 @@
 
 #include "devices/conformance/reported_velocity.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_reported_velocity {
+
 namespace {
 
 using Catch::Contains;
@@ -110,4 +111,4 @@ TEST_CASE("coarse numbers need a longer path", "[reported_velocity]") {
   CHECK(least_travel_by_pulses(1e-4, 1e-3).rad == Approx(0.02));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_reported_velocity

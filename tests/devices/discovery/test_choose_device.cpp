@@ -6,7 +6,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_choose_device {
+
 namespace {
 
 using namespace test;
@@ -199,4 +200,4 @@ TEST_CASE("a puck with another range than the profile is not selected", "[choose
                       "-32767 to 32767"));
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_choose_device

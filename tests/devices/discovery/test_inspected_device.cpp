@@ -5,7 +5,8 @@
 #include "tests/support/case_count.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_inspected_device {
+
 namespace {
 
 using namespace test;
@@ -77,4 +78,4 @@ TEST_CASE("every descriptor gives a result or an error", "[inspected_device]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_inspected_device

@@ -9,7 +9,8 @@
 #include "devices/discovery/unusable_devices.hpp"
 #include "tests/support/paths.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_match_profile {
+
 using Catch::Contains;
 
 namespace {
@@ -240,3 +241,5 @@ TEST_CASE("any device of 3Dconnexion with six axes is a SpaceMouse", "[match_pro
   other.input_reports = {{1, 13}};
   CHECK(matched(other).empty());
 }
+
+}  // namespace wrenchd::test_match_profile

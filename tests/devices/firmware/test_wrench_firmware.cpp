@@ -20,10 +20,11 @@
 #include "tests/support/hex_text.hpp"
 #include "tests/support/shipped_config.hpp"
 
+namespace wrenchd::test_wrench_firmware {
+
 // The firmware reference of devices/firmware/: its core alone against the rules of devices/README.md, and as
 // the far side of a link of the driver and of the servo loop.
 
-using namespace wrenchd;
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -468,3 +469,5 @@ TEST_CASE("wrenchd does not arm if the firmware's watchdog never trips", "[firmw
   FirmwareRun run(pressing(), frozen);
   CHECK_FALSE(run.tick_until(State::disarmed, 2000));
 }
+
+}  // namespace wrenchd::test_wrench_firmware

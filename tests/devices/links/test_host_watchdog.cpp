@@ -11,7 +11,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/paths.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_host_watchdog {
+
 namespace {
 
 using namespace std::chrono_literals;
@@ -141,4 +142,4 @@ TEST_CASE("the watchdog does not allocate or lock", "[host_watchdog]") {
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_host_watchdog

@@ -16,7 +16,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/paths.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_latest_writer {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -193,3 +194,5 @@ TEST_CASE("submitting a report does not allocate or lock", "[usb][realtime]") {
   }
   CHECK(seen == 0);
 }
+
+}  // namespace wrenchd::test_latest_writer

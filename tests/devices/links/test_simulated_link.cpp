@@ -17,7 +17,8 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/paths.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_simulated_link {
+
 using namespace std::chrono_literals;
 using Catch::Contains;
 using Kind = SimulatedFault::Kind;
@@ -493,3 +494,5 @@ TEST_CASE("a profile without an emulator is rejected with the remedy", "[simulat
   CHECK_THROWS_WITH(make_simulated_link(shipped("falcon"), exact({}), clock),
                     Contains("at least one waypoint"));
 }
+
+}  // namespace wrenchd::test_simulated_link

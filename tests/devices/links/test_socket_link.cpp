@@ -14,7 +14,8 @@
 #include "devices/links/socket_link.hpp"
 #include "tests/support/no_allocation.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_socket_link {
+
 namespace {
 
 using namespace test;
@@ -175,4 +176,4 @@ TEST_CASE("reading and writing a socket does not allocate or lock", "[socket_lin
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_socket_link

@@ -8,7 +8,8 @@
 #include "devices/links/write_slot.hpp"
 #include "tests/support/no_allocation.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_write_slot {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -133,3 +134,5 @@ TEST_CASE("submitting and taking do not allocate or lock", "[usb][realtime]") {
   }
   CHECK(seen == 0);
 }
+
+}  // namespace wrenchd::test_write_slot

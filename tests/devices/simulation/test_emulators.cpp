@@ -18,7 +18,8 @@
 #include "tests/support/polhem_pose.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_emulators {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -515,3 +516,5 @@ TEST_CASE("an unplugged device is lost until it is opened again", "[emulators]")
   CHECK(bench.sample.fault == Fault::none);
   CHECK(bench.sample.fresh);
 }
+
+}  // namespace wrenchd::test_emulators

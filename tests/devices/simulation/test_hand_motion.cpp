@@ -6,7 +6,8 @@
 #include "devices/simulation/hand_motion.hpp"
 #include "tests/support/random_values.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_hand_motion {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -152,3 +153,5 @@ TEST_CASE("a handle that is exactly on a recorded path has no goal", "[hand_moti
   CHECK(hand.motion.prescribed());
   CHECK_FALSE(hand.motion.set_goal({{}, hand.now + 1s}));
 }
+
+}  // namespace wrenchd::test_hand_motion

@@ -12,7 +12,8 @@
 #include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_simulated_device {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -602,3 +603,5 @@ TEST_CASE("a profile that the simulated device does not support is rejected") {
   CHECK_THROWS_WITH(SimulatedDevice(profile, SimulationSettings{}),
                     Catch::Contains("device profile loopback"));
 }
+
+}  // namespace wrenchd::test_simulated_device

@@ -20,7 +20,8 @@
 #include "tests/support/paths.hpp"
 #include "tests/support/polhem_pose.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_emulated_devices {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -157,3 +158,5 @@ TEST_CASE("a SpaceMouse over the mock kernel: the tool moves by velocity times t
   CHECK(mouse.take_command(t, wire.receive(2)));
   CHECK_FALSE(mouse.led());
 }
+
+}  // namespace wrenchd::test_emulated_devices

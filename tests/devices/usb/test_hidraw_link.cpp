@@ -11,7 +11,8 @@
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/no_allocation.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_hidraw_link {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Contains;
@@ -249,3 +250,5 @@ TEST_CASE("hidraw: a device that another link has open is not opened", "[usb]") 
   bench.link.close();
   CHECK_NOTHROW(second.open());
 }
+
+}  // namespace wrenchd::test_hidraw_link

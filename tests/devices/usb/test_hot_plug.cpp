@@ -13,9 +13,10 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/soon.hpp"
 
+namespace wrenchd::test_hot_plug {
+
 // The complete daemon as a process, with a device that is connected and disconnected.
 
-using namespace wrenchd;
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Contains;
@@ -224,3 +225,5 @@ TEST_CASE("wrenchctl calibrate asks for the axes and stores nothing if it is sto
   CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
   CHECK_FALSE(handle.was_pushed());
 }
+
+}  // namespace wrenchd::test_hot_plug

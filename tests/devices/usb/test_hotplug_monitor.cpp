@@ -9,7 +9,8 @@
 #include "devices/discovery/hotplug_monitor.hpp"
 #include "tests/devices/usb/mock_device.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_hotplug_monitor {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -67,3 +68,5 @@ TEST_CASE("a monitor can be stopped while no event comes", "[usb]") {
   const MockMachine machine;
   for (int i = 0; i < 20; ++i) const HotplugMonitor monitor([](const HotplugEvent&) {});
 }
+
+}  // namespace wrenchd::test_hotplug_monitor

@@ -9,7 +9,8 @@
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/no_allocation.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_reconnecting_link {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Contains;
@@ -151,3 +152,5 @@ TEST_CASE("reading and writing over a reconnecting link does not allocate", "[us
   link.write(now(), command);
   CHECK(guard.allocations() == 0);
 }
+
+}  // namespace wrenchd::test_reconnecting_link

@@ -6,7 +6,8 @@
 #include "devices/discovery/usb_devices.hpp"
 #include "tests/devices/usb/mock_device.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_usb_devices {
+
 using namespace wrenchd::test;
 using Catch::Contains;
 
@@ -124,3 +125,5 @@ TEST_CASE("bus and ports are part of the path of all devices below them", "[usb]
   CHECK(port_path_in("").empty());
   CHECK(port_path_in("-/1-/-1/1-a/a-1").empty());
 }
+
+}  // namespace wrenchd::test_usb_devices

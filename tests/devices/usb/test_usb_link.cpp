@@ -10,7 +10,8 @@
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/no_allocation.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_usb_link {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Contains;
@@ -325,3 +326,5 @@ TEST_CASE("libusb: reading and submitting neither allocate nor lock", "[usb][rea
   CHECK(read == 20);
   CHECK(seen == 0);
 }
+
+}  // namespace wrenchd::test_usb_link

@@ -27,7 +27,8 @@
 #include "tools/import/import_file.hpp"
 #include "tools/import/imported_body.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_cad_import {
+
 namespace {
 
 using namespace test;
@@ -417,4 +418,4 @@ TEST_CASE("a solid that intersects itself is rejected with its place") {
   contains(message, "in the CAD program");
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_cad_import

@@ -15,7 +15,8 @@
 #include "tests/support/run_program.hpp"
 #include "tests/tools/import/sample_cad.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_import_program {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -179,4 +180,4 @@ TEST_CASE("a chord error that single precision does not keep is rejected") {
   CHECK(run_program("wrenchd-import", {step, "-o", (dir.path() / "far.ply").string()}).exit_code == 0);
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_import_program

@@ -15,7 +15,8 @@
 #include "tools/import/import_file.hpp"
 #include "tools/import/imported_body.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_mesh_import {
+
 namespace {
 
 using namespace test;
@@ -287,4 +288,4 @@ TEST_CASE("a damaged mesh file is rejected") {
   check_contains(rejection("a.obj", obj({{"box", 0.0}}), few), "has more than 11 triangles");
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_mesh_import

@@ -9,7 +9,8 @@
 #include "tools/import/import_error.hpp"
 #include "tools/import/robot_import.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_robot_import {
+
 namespace {
 
 using namespace test;
@@ -174,4 +175,4 @@ TEST_CASE("joints that form a ring are rejected") {
   check_contains(Robot(ring).rejection(), "its joints form a ring");
 }
 
-}  // namespace wrenchd
+}  // namespace wrenchd::test_robot_import

@@ -6,7 +6,7 @@
 
 #include "tools/spacenav/axis_rates.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_axis_rates {
 
 namespace {
 
@@ -54,3 +54,5 @@ TEST_CASE("a jump and a pose that is not finite are no motion", "[spacenav]") {
   CHECK(axis_rates(kOrigin, {0, 0, 0, 0, 0, 0, 0}, 0.01, {}) == none);
   CHECK(axis_rates(kOrigin, {0, 0, 0, 0, std::numeric_limits<double>::infinity(), 0, 1}, 0.01, {}) == none);
 }
+
+}  // namespace wrenchd::test_axis_rates

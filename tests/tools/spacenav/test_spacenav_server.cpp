@@ -14,7 +14,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/spacenav/spacenav_server.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_spacenav_server {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 using Catch::Matchers::Contains;
@@ -240,3 +241,5 @@ TEST_CASE("the socket is private, and only the socket of a dead server is replac
   CHECK_THROWS_WITH(SpacenavServer(files.path() / std::string(120, 'x'), false), Contains("too long"));
   CHECK_THROWS_WITH(SpacenavServer("/nowhere/n.sock", false), Contains("cannot be created"));
 }
+
+}  // namespace wrenchd::test_spacenav_server

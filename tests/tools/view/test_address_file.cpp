@@ -12,7 +12,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/address_file.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_address_file {
+
 namespace {
 
 using namespace test;
@@ -89,4 +90,4 @@ TEST_CASE("wrenchctl view --open puts the token on no command line", "[address_f
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_address_file

@@ -8,7 +8,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/connection_owner.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_connection_owner {
+
 namespace {
 
 using namespace test;
@@ -66,4 +67,4 @@ TEST_CASE("the lists of IPv4 and IPv6 connections are read, and only loopback an
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_connection_owner

@@ -5,7 +5,7 @@
 
 #include "tools/view/contact_forces.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_contact_forces {
 
 namespace {
 
@@ -77,3 +77,5 @@ TEST_CASE("contacts that cancel each other determine no force", "[view]") {
     CHECK(std::isnan(force));
   CHECK(contact_forces_N({}, Vector3d::Zero(), kZ, Vector3d::Zero()).empty());
 }
+
+}  // namespace wrenchd::test_contact_forces

@@ -11,7 +11,7 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tools/view/display_mesh.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_display_mesh {
 
 namespace {
 
@@ -89,3 +89,5 @@ TEST_CASE("a triangle that names a missing vertex is rejected", "[view]") {
   const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 1, 3}};
   CHECK_THROWS_AS(display_mesh(vertices, triangles, 10), std::invalid_argument);
 }
+
+}  // namespace wrenchd::test_display_mesh

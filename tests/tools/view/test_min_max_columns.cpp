@@ -7,7 +7,7 @@
 
 #include "tools/view/min_max_columns.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_min_max_columns {
 
 namespace {
 
@@ -87,3 +87,5 @@ TEST_CASE("a range of no length has one column", "[view]") {
   columns.add(bucket(5, 1.0, 1.0));
   CHECK(columns.columns().size() == 1);
 }
+
+}  // namespace wrenchd::test_min_max_columns

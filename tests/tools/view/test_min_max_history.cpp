@@ -6,7 +6,7 @@
 
 #include "tools/view/min_max_history.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_min_max_history {
 
 namespace {
 
@@ -64,3 +64,5 @@ TEST_CASE("old buckets are dropped, and indices are never reused", "[view]") {
   REQUIRE(extremes.end_index() == 21);
   CHECK(extremes.at(20).min[0] == -1.0);
 }
+
+}  // namespace wrenchd::test_min_max_history

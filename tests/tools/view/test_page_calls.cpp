@@ -10,7 +10,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/page_calls.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_page_calls {
+
 using namespace wrenchd::test;
 
 namespace {
@@ -97,3 +98,5 @@ TEST_CASE("a page whose daemon is gone learns why", "[view]") {
   REQUIRE(replies.wait_for(1));
   CHECK(replies.all()[0].error.find("nobody.sock") != std::string::npos);
 }
+
+}  // namespace wrenchd::test_page_calls

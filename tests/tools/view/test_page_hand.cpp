@@ -13,7 +13,8 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/view/page_hand.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_page_hand {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -78,3 +79,5 @@ TEST_CASE("a page whose goal cannot be sent learns why", "[view]") {
   CHECK(rejections.text().find("nobody.sock") != std::string::npos);
   CHECK(rejections.page == 7);
 }
+
+}  // namespace wrenchd::test_page_hand

@@ -11,7 +11,8 @@
 #include "tests/support/stub_daemon.hpp"
 #include "tools/view/page_lease.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_page_lease {
+
 using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
@@ -122,3 +123,5 @@ TEST_CASE("the page that sent a request receives an error if the daemon is absen
     CHECK(one.error.find("/nowhere/control.sock") != std::string::npos);
   }
 }
+
+}  // namespace wrenchd::test_page_lease

@@ -5,7 +5,7 @@
 
 #include "tools/view/rolling_histogram.hpp"
 
-using namespace wrenchd;
+namespace wrenchd::test_rolling_histogram {
 
 namespace {
 
@@ -57,3 +57,5 @@ TEST_CASE("durations older than ten seconds are dropped", "[view]") {
   CHECK(times.summary().count == 1);
   CHECK(times.summary().max_us == Approx(30.0));
 }
+
+}  // namespace wrenchd::test_rolling_histogram

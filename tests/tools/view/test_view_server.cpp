@@ -17,7 +17,8 @@
 #include "tools/view/recorded_feed.hpp"
 #include "tools/view/view_server.hpp"
 
-namespace wrenchd {
+namespace wrenchd::test_view_server {
+
 namespace {
 
 using namespace test;
@@ -145,4 +146,4 @@ TEST_CASE("other users get no answer, even with the token, and take no connectio
 }
 
 }  // namespace
-}  // namespace wrenchd
+}  // namespace wrenchd::test_view_server
