@@ -353,7 +353,14 @@ std::vector<Abuse> abuses() {
          RigClient first = rig.connect(TestUser::operator_), second = rig.connect(TestUser::operator_);
          for (const char* method : {"lease.acquire", "arm", "lease.heartbeat", "lease.release"}) {
            CHECK(first.error_code("lease.acquire") == 0);  // counts as a heartbeat
-           CHECK(second.error_code(method) == code_of(RpcCode::lease_held));
+           int code = second.error_code(method);
+           // On a busy machine the lease may end between two requests; then this attempt shows nothing.
+           while (first.error_code("lease.heartbeat") != 0) {
+             second.error_code("lease.release");
+             CHECK(first.error_code("lease.acquire") == 0);
+             code = second.error_code(method);
+           }
+           CHECK(code == code_of(RpcCode::lease_held));
          }
          CHECK(second.error_code("lease.acquire", {{"preempt", true}}) ==
                code_of(RpcCode::permission_denied));
@@ -760,7 +767,7 @@ TEST_CASE("the thread of an idle socket sleeps", "[control_socket]") {
   RigClient client = rig.connect(TestUser::observer);
   const auto events_before = client.result("status")["sequence"].get<std::uint64_t>();
   // Counts how often the thread, found by its name, slept voluntarily; preemption does not count.
-  const auto sleeps = [] {
+  const auto sleeps = []() -> std::optional<std::uint64_t> {
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
       std::string line;
       std::getline(std::ifstream(task.path() / "comm"), line);
@@ -769,14 +776,14 @@ TEST_CASE("the thread of an idle socket sleeps", "[control_socket]") {
       for (std::ifstream status(task.path() / "status"); std::getline(status, line);)
         if (line.starts_with(wanted)) return std::stoull(line.substr(wanted.size()));
     }
-    return 0ULL;
+    return std::nullopt;
   };
   const auto before = sleeps();
   std::this_thread::sleep_for(300ms);
-  REQUIRE(before > 0);
+  REQUIRE(before);
   // Each event of the loop wakes the thread once.
   const auto events = client.result("status")["sequence"].get<std::uint64_t>() - events_before;
-  CHECK(sleeps() - before <= 4 + events);
+  CHECK(sleeps().value() - *before <= 4 + events);
 }
 
 }  // namespace
