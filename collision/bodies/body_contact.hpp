@@ -29,7 +29,8 @@ struct BodyContact {
   Vector3d normal_W = Vector3d::UnitZ();       ///< unit normal towards body a, where it acted
   double slip_m = 0.0;                         ///< length of the slip in the last step
   StaticVector<Vector3d, 4> active_normals;    ///< of its cone, at the last answer (ConeProjection)
-  bool stays = false;                          ///< is not dropped in this step
+  /// Its features do not face each other at the end of the last step. The next step begins without it.
+  bool expired = false;
   /// Body number of the tool whose `curvature` is known in this step. kFixed: none.
   std::size_t curvature_of = kFixed;
   /// Second derivative of the gap by the translation of that tool in W and by its rotation in T.

@@ -5,15 +5,11 @@
 #include <utility>
 
 namespace wrenchd {
-namespace {
 
-/// METHOD (92).
 double displacement_bound_m(const BodyPath& path, double radius_m) noexcept {
   return (path.end.translation_m - path.start.translation_m).norm() +
          radius_m * path.start.rotation.angularDistance(path.end.rotation);
 }
-
-}  // namespace
 
 BodyPair::BodyPair(std::size_t a, std::size_t b, Scene scene)
     : a_(a), b_(b), scene_(std::move(scene)), half_spaces_(scene_), contacts_(scene_) {}

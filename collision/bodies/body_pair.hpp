@@ -14,6 +14,9 @@ struct BodyPath {
   Pose start, end;
 };
 
+/// Upper bound on the displacement of a point of a body of this radius [m], METHOD (92). RT-safe.
+double displacement_bound_m(const BodyPath& path, double radius_m) noexcept;
+
 /// The pose at a fraction of the straight path between two poses. RT-safe.
 inline Pose between(const Pose& from, const Pose& to, double fraction) noexcept {
   return {from.rotation.slerp(fraction, to.rotation),

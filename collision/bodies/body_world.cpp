@@ -77,7 +77,6 @@ BodyWorld::BodyWorld(const Scene& scene, std::vector<FreeBody> bodies, const Set
   contacts_.reserve(kMaxContacts);
   contacts_before_.reserve(kMaxContacts);
   bodies_before_.reserve(bodies_.size());
-  dropped_.reserve(kMaxContacts);
   island_contacts_.reserve(kMaxContacts);
   island_bodies_.reserve(bodies_.size());
   impact_.contacts.reserve(kMaxContacts);
@@ -124,12 +123,13 @@ BodyWorld::Status BodyWorld::step(const std::optional<Hand>& hand, double dt_s, 
   for (rounds_ = 0; rounds_ < settings_.rounds && !clean; ++rounds_) {
     solve_islands();
     clean = sweep_pairs();
-    if (clean) clean = !drop_separated();
   }
-  if (clean)
+  if (clean) {
+    drop_separated();
     rebound();
-  else
+  } else {
     hold_all();
+  }
   apply_impulses(tool);
   finish_grasps();
   if (clean) time_s_ = until_s;
@@ -219,9 +219,8 @@ void BodyWorld::begin(const std::optional<Hand>& hand, std::size_t tool) noexcep
     bodies_[one.body].weight_per_s2 = one.hand ? one.hand->stiffness_per_s2 : 0.0;
   }
   advance_returns();
-  dropped_.clear();
+  std::erase_if(contacts_, [&](const BodyContact& c) { return c.expired && !bodies_[c.a].asleep; });
   for (BodyContact& contact : contacts_) {
-    contact.stays = false;
     contact.curvature_of = BodyContact::kFixed;
     contact.last_force_W_N = contact.force_W_N;
     bodies_[contact.a].touches = true;

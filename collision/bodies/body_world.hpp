@@ -277,10 +277,13 @@ class BodyWorld {
   bool is_shortened(std::size_t body) const noexcept {
     return body != BodyContact::kFixed && bodies_[body].shortened;
   }
+  bool meets_soon(BodyPair& pair) noexcept;
   bool add_behind(BodyPair& pair) noexcept;
   bool add_touching(BodyPair& pair) noexcept;
   bool add_contact(const BodyPair& pair, const Contact& contact) noexcept;
-  bool drop_separated() noexcept;
+  bool store_contact(const BodyPair& pair, const Contact& contact) noexcept;
+  void drop_separated() noexcept;
+  void add_successors(const BodyContact& expired) noexcept;
   bool held_open(const BodyPair& pair, const SweepQuery::SweepResult& found) const noexcept;
   void unsolve(std::size_t body) noexcept;
   void wake(std::size_t body) noexcept;
@@ -318,7 +321,6 @@ class BodyWorld {
   double time_before_s_ = 0.0;
   std::vector<Tool> tools_, tools_before_;  ///< before: before the last step
   bool tool_was_moved_ = false;
-  std::vector<BodyContact> dropped_;  ///< contacts that carried and were dropped in this step
   std::vector<std::size_t> island_bodies_, island_contacts_;
   Impact impact_;
   ConeProjection cones_;

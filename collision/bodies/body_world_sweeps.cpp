@@ -16,6 +16,10 @@ constexpr double kNearby = 4.0;
 /// A path that is too long falls to this fraction.
 constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
+/// Length of the first part of a path that is swept [m]. The next parts are longer by this factor.
+constexpr double kFirstPart_m = 5e-4, kLonger = 4.0;
+/// Features that continue those of an expired contact touch at most this far from it, beside its slip [m].
+constexpr double kSuccessor_m = 1e-6;
 
 }  // namespace
 
@@ -58,6 +62,7 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
     for (std::size_t k = known; k < met.size(); ++k) free = !add_contact(pair, met[k]) && free;
   }
   if (!pair.is_near(path_of(pair.a()), path_of(pair.b()))) return free;
+  if (meets_soon(pair)) return false;
   const SweepQuery::SweepResult found = sweep(pair, kClearance_m);
   bool found_new = false;
   for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
@@ -73,6 +78,27 @@ bool BodyWorld::sweep_pair(BodyPair& pair) noexcept {
 /// Sweeps the paths of a pair.
 SweepQuery::SweepResult BodyWorld::sweep(BodyPair& pair, double clearance_m) noexcept {
   return pair.sweep(path_of(pair.a()), path_of(pair.b()), clearance_m, budget_, {time_s_, until_s_});
+}
+
+/// Sweeps short parts of a long path, from its start, because most paths meet something soon. Returns true if
+/// one of them meets a contact that is not known; adds it. Contacts with obstacles that move are those at the
+/// end of the step, so there only the whole path counts.
+bool BodyWorld::meets_soon(BodyPair& pair) noexcept {
+  if (pair.scene().has_moving_obstacles()) return false;
+  const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
+  double length_m = displacement_bound_m(path_a, bodies_[pair.a()].radius_m);
+  if (!pair.is_fixed()) length_m += displacement_bound_m(path_b, bodies_[pair.b()].radius_m);
+  for (double part = kFirstPart_m / length_m; part * kLonger < 1.0; part *= kLonger) {
+    const auto first_part = [part](const BodyPath& path) {
+      return BodyPath{path.start, between(path.start, path.end, part)};
+    };
+    const SweepQuery::SweepResult found =
+        pair.sweep(first_part(path_a), first_part(path_b), kClearance_m, budget_, {time_s_, until_s_});
+    bool found_new = false;
+    for (const Contact& contact : found.contacts) found_new = add_contact(pair, contact) || found_new;
+    if (found_new) return true;
+  }
+  return false;
 }
 
 /// Adds contacts that a sweep did not name because the path meets known ones first. These are held open, but
@@ -139,8 +165,16 @@ void BodyWorld::shorten(const BodyPair& pair) noexcept {
   }
 }
 
-/// Returns false if the contact is known or there is no room.
+/// Adds a contact that the answer must keep open. Returns false if it is known or there is no room.
 bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexcept {
+  if (!store_contact(pair, contact)) return false;
+  unsolve(pair.a());
+  unsolve(pair.b());
+  return true;
+}
+
+/// Adds a contact to the known ones. Returns false if it is among them or there is no room.
+bool BodyWorld::store_contact(const BodyPair& pair, const Contact& contact) noexcept {
   if (contacts_.size() == kMaxContacts) return false;
   BodyContact added;
   added.a = pair.a();
@@ -154,34 +188,36 @@ bool BodyWorld::add_contact(const BodyPair& pair, const Contact& contact) noexce
   if (pair.is_fixed() && pair.scene().has_moving_obstacles())
     added.obstacle_motion = pair.scene().obstacle_displacement(contact.obstacle, time_s_, until_s_);
   added.hold_m = held_gap_m(added, 0.0);
-  added.stays = std::any_of(dropped_.begin(), dropped_.end(), [&](const BodyContact& dropped) {
-    return dropped.a == added.a && dropped.b == added.b && same_features(dropped.contact, contact);
-  });
   contacts_.push_back(added);
-  unsolve(added.a);
-  unsolve(added.b);
   return true;
 }
 
-/// Drops contacts that do not touch, and contacts whose features do not face each other. Returns true if one
-/// of these carried: the poses are then solved again. If a sweep then finds the same contact once more, as at
-/// the border of a face, the contact stays until the next step.
-bool BodyWorld::drop_separated() noexcept {
-  bool carried = false;
-  std::erase_if(contacts_, [&](const BodyContact& c) {
-    if (bodies_[c.a].asleep || c.stays) return false;
-    const double gap_m = geometry(c).gap_m;
-    const bool loaded = c.force_W_N.squaredNorm() > 0.0;
-    if (gap_m > kTouch * kClearance_m) return !loaded;
-    if (pair_of(c).touches(c.contact)) return false;
-    if (!loaded) return true;
-    carried = true;
-    if (dropped_.size() < dropped_.capacity()) dropped_.push_back(c);
-    unsolve(c.a);
-    unsolve(c.b);
-    return true;
+/// Drops contacts that do not touch. A contact that carries although its features do not face each other, as
+/// just beyond the border of a face, expires, and its successors become known: core/METHOD.md, section 15.4.
+void BodyWorld::drop_separated() noexcept {
+  std::erase_if(contacts_, [&](BodyContact& c) {
+    if (bodies_[c.a].asleep) return false;
+    const bool carries = c.force_W_N.squaredNorm() > 0.0;
+    const bool is_open = geometry(c).gap_m > kTouch * kClearance_m;
+    const bool touches = !is_open && pair_of(c).touches(c.contact);
+    c.expired = carries && !is_open && !touches;
+    return !carries && !touches;
   });
-  return carried;
+  const std::size_t count = contacts_.size();
+  for (std::size_t k = 0; k < count; ++k)
+    if (contacts_[k].expired && !bodies_[contacts_[k].a].asleep) add_successors(contacts_[k]);
+}
+
+/// Adds the contacts that touch where a contact expires, to the length of its slip.
+void BodyWorld::add_successors(const BodyContact& expired) noexcept {
+  BodyContact next = expired;
+  const Vector3d point_W_m = geometry(expired).point_W_m;
+  const double reach_m = slip_m(expired, acting_geometry(expired)).norm() + kSuccessor_m;
+  const BodyPair& pair = pair_of(expired);
+  for (const Contact& contact : pair.touching()) {
+    next.contact = contact;
+    if ((geometry(next).point_W_m - point_W_m).norm() <= reach_m) store_contact(pair, contact);
+  }
 }
 
 /// Prepares the sweeps of the next step, for the motions that the bodies would have without contact.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -250,6 +251,48 @@ TEST_CASE("friction does not vanish where a tool presses bodies aside", "[body_w
   CHECK(loaded > 5000);
   CHECK(50 * frictionless < loaded);
   CHECK(unfinished < 240);  // of 12,000
+}
+
+// An edge of the tool slides along an edge of a body that a fine mesh divides into 40 parts. Each part
+// continues the one before, so its contact is known when the tool gets there, and nothing is solved again.
+TEST_CASE("a tool slides along a divided edge as along a whole one", "[body_world]") {
+  const auto slide = [](std::uint32_t triangles) {
+    const Scene scene = table();
+    BodyWorld::Settings settings;
+    settings.sleeps = false;
+    const ToolBody block = tool_body(make_mesh({"box", triangles, 1, Vector3d::Constant(0.05)}), 1.0, 10.0);
+    BodyWorld world(scene, {body_at({0.0, 0.0, 0.025 + 1e-9}, block)}, settings);
+    BodyWorld::Hand hand;
+    hand.stiffness_per_s2 = 20000.0;
+    // The lower edge of the tool lies across the body's edge at x = 25 mm.
+    hand.X_WP.rotation = rotation_from({0.0, 0.25 * std::numbers::pi, 0.0}) * rotation_from({0.3, 0.0, 0.0});
+    hand.X_WP.translation_m = {0.02, -0.01, 0.1};
+    world.enter_tool(0, hand.X_WP);
+    std::vector<Pose> path;
+    int again = 0, touching = 0;
+    for (int k = 0; k < 600; ++k) {
+      hand.X_WP.translation_m.z() = std::max(0.1 - 2e-4 * k, 0.07);
+      if (k > 200) hand.X_WP.translation_m.y() += 5e-5;
+      CHECK(world.step(hand, kStep_s) == BodyWorld::Status::converged);
+      path.push_back(world.motion(0).X_WB);
+      if (k <= 200) continue;
+      again += world.rounds() > 1 ? 1 : 0;
+      touching += std::any_of(world.contacts().begin(), world.contacts().end(), [](const BodyContact& c) {
+        return c.a == 0 && c.contact.kind == ContactKind::edge_edge;
+      });
+    }
+    return std::make_tuple(path, again, touching);
+  };
+  const auto [whole, whole_again, whole_touching] = slide(12);
+  const auto [divided, divided_again, divided_touching] = slide(20'000);
+  CHECK(whole_touching > 300);
+  CHECK(divided_touching == whole_touching);
+  CHECK(whole_again < 5);
+  CHECK(divided_again < 5);
+  double apart_m = 0.0;
+  for (std::size_t k = 0; k < whole.size(); ++k)
+    apart_m = std::max(apart_m, (whole[k].translation_m - divided[k].translation_m).norm());
+  CHECK(apart_m < 1e-8);
 }
 
 TEST_CASE("a tool among bodies that it does not touch follows its hand as a proxy does", "[body_world]") {
