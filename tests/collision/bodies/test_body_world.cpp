@@ -346,6 +346,30 @@ TEST_CASE("an obstacle that moves lifts a body and carries it along", "[body_wor
   CHECK(carried.X_WB.translation_m.z() == Approx(0.025).epsilon(1e-6));
 }
 
+// The contacts of its lower face expire one after the other beyond the edge of the obstacle.
+TEST_CASE("a body that slides off an obstacle falls", "[body_world]") {
+  for (const std::uint32_t triangles : {12u, 5000u}) {
+    CAPTURE(triangles);
+    const auto mesh = [&](const Vector3d& size_m) { return make_mesh({"box", triangles, 1, size_m}); };
+    std::vector<MeshObstacle> obstacles;
+    obstacles.emplace_back("plate", MeshBvh(mesh({0.2, 0.2, 0.02})),
+                           Pose{Quaterniond::Identity(), {0.0, 0.0, -0.01}});
+    const Scene scene(cube(), {}, {}, std::move(obstacles));
+    FreeBody body =
+        body_at({0.05, 0.0, 0.025 + 1e-8}, tool_body(mesh(Vector3d::Constant(0.05)), 1.0, 0.1), 0.0);
+    body.motion.velocity_W_m_per_s.x() = 1.0;
+    BodyWorld world(scene, {body}, {});
+    const double energy_J = world.energy_J();
+    CHECK(run(world, 0.4) == 0);
+    // Its centre passes the edge after 0.05 s and its last corner after 0.075 s.
+    const Pose& X_WB = world.motion(1).X_WB;
+    CHECK(X_WB.translation_m.x() == Approx(0.45).epsilon(0.05));
+    CHECK(X_WB.translation_m.z() < 0.025 - 0.5 * kGravity_m_per_s2 * 0.325 * 0.325);
+    CHECK(world.contacts().empty());
+    CHECK(world.energy_J() <= energy_J + 1e-9);
+  }
+}
+
 TEST_CASE("a step neither allocates nor locks", "[body_world]") {
   const Scene scene = table();
   std::vector<FreeBody> bodies;
