@@ -18,6 +18,8 @@ constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
 /// Length of the first part of a path that is swept [m]. The next parts are longer by this factor.
 constexpr double kFirstPart_m = 5e-4, kLonger = 4.0;
+/// Least first part, as a fraction of the path: also an endless path has few parts.
+constexpr double kLeastPart = 1.0 / 1024.0;
 /// Features that continue those of an expired contact touch at most this far from it, beside its slip [m].
 constexpr double kSuccessor_m = 1e-6;
 
@@ -88,7 +90,7 @@ bool BodyWorld::meets_soon(BodyPair& pair) noexcept {
   const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
   double length_m = displacement_bound_m(path_a, bodies_[pair.a()].radius_m);
   if (!pair.is_fixed()) length_m += displacement_bound_m(path_b, bodies_[pair.b()].radius_m);
-  for (double part = kFirstPart_m / length_m; part * kLonger < 1.0; part *= kLonger) {
+  for (double part = std::max(kFirstPart_m / length_m, kLeastPart); part * kLonger < 1.0; part *= kLonger) {
     const auto first_part = [part](const BodyPath& path) {
       return BodyPath{path.start, between(path.start, path.end, part)};
     };
