@@ -18,9 +18,9 @@ constexpr double kShorter = 0.25;
 constexpr double kMinFraction = 1.0 / 256.0;
 /// Length of the first part of a path that is swept [m]. The next parts are longer by this factor.
 constexpr double kFirstPart_m = 5e-4, kLonger = 4.0;
-/// Least first part, as a fraction of the path: also an endless path has few parts.
+/// Least first part, as a fraction of the path. Limits the number of parts to four.
 constexpr double kLeastPart = 1.0 / 1024.0;
-/// Features that continue those of an expired contact touch at most this far from it, beside its slip [m].
+/// Tolerance of the distance between an expired contact and those that continue it [m].
 constexpr double kSuccessor_m = 1e-6;
 
 }  // namespace
@@ -82,9 +82,9 @@ SweepQuery::SweepResult BodyWorld::sweep(BodyPair& pair, double clearance_m) noe
   return pair.sweep(path_of(pair.a()), path_of(pair.b()), clearance_m, budget_, {time_s_, until_s_});
 }
 
-/// Sweeps short parts of a long path, from its start, because most paths meet something soon. Returns true if
-/// one of them meets a contact that is not known; adds it. Contacts with obstacles that move are those at the
-/// end of the step, so there only the whole path counts.
+/// Sweeps the first part of a long path, then longer ones, because most paths meet something soon. Adds what
+/// the first of them meets that is not known, and returns true if there is such a contact. Contacts with
+/// obstacles that move are those at the end of the step, so with these only the whole path counts.
 bool BodyWorld::meets_soon(BodyPair& pair) noexcept {
   if (pair.scene().has_moving_obstacles()) return false;
   const BodyPath path_a = path_of(pair.a()), path_b = path_of(pair.b());
@@ -197,20 +197,20 @@ bool BodyWorld::store_contact(const BodyPair& pair, const Contact& contact) noex
 /// Drops contacts that do not touch. A contact that carries although its features do not face each other, as
 /// just beyond the border of a face, expires, and its successors become known: core/METHOD.md, section 15.4.
 void BodyWorld::drop_separated() noexcept {
-  std::erase_if(contacts_, [&](BodyContact& c) {
-    if (bodies_[c.a].asleep) return false;
-    const bool carries = c.force_W_N.squaredNorm() > 0.0;
-    const bool is_open = geometry(c).gap_m > kTouch * kClearance_m;
-    const bool touches = !is_open && pair_of(c).touches(c.contact);
-    c.expired = carries && !is_open && !touches;
-    return !carries && !touches;
+  const auto carries = [](const BodyContact& c) { return c.force_W_N.squaredNorm() > 0.0; };
+  const auto is_open = [&](const BodyContact& c) { return geometry(c).gap_m > kTouch * kClearance_m; };
+  const auto faces = [&](const BodyContact& c) { return pair_of(c).touches(c.contact); };
+  std::erase_if(contacts_, [&](const BodyContact& c) {
+    return !bodies_[c.a].asleep && !carries(c) && (is_open(c) || !faces(c));
   });
+  for (BodyContact& c : contacts_)
+    if (!bodies_[c.a].asleep) c.expired = carries(c) && !is_open(c) && !faces(c);
   const std::size_t count = contacts_.size();
   for (std::size_t k = 0; k < count; ++k)
     if (contacts_[k].expired && !bodies_[contacts_[k].a].asleep) add_successors(contacts_[k]);
 }
 
-/// Adds the contacts that touch where a contact expires, to the length of its slip.
+/// Adds the contacts that continue an expired one: those that touch no farther from it than it slipped.
 void BodyWorld::add_successors(const BodyContact& expired) noexcept {
   BodyContact next = expired;
   const Vector3d point_W_m = geometry(expired).point_W_m;

@@ -253,7 +253,7 @@ TEST_CASE("friction does not vanish where a tool presses bodies aside", "[body_w
   CHECK(unfinished < 240);  // of 12,000
 }
 
-// An edge of the tool slides along an edge of a body that a fine mesh divides into 40 parts. Each part
+// An edge of the tool slides along an edge of a body that a fine mesh divides into 41 parts. Each part
 // continues the one before, so its contact is known when the tool gets there, and nothing is solved again.
 TEST_CASE("a tool slides along a divided edge as along a whole one", "[body_world]") {
   const auto slide = [](std::uint32_t triangles) {
@@ -368,6 +368,48 @@ TEST_CASE("a body that slides off an obstacle falls", "[body_world]") {
     CHECK(world.contacts().empty());
     CHECK(world.energy_J() <= energy_J + 1e-9);
   }
+}
+
+// Its contacts are forgotten while the hand is 29 mm below the tool. Swept as a whole, the path to the hand
+// takes 35,327 node visits and does not end in this step.
+TEST_CASE("a long path that meets something soon takes few node visits", "[body_world]") {
+  const auto bumpy = [](std::uint32_t seed, double mass_kg) {
+    return tool_body(make_mesh({"bumpy", 20'000, seed, Vector3d::Constant(0.05)}), 1.0, mass_kg);
+  };
+  const Scene scene(bumpy(1, 0.1), {HalfSpaceSettings{"table", Vector3d::UnitZ(), 0.0}});
+  BodyWorld::Settings settings;
+  settings.sleeps = false;
+  BodyWorld world(scene, {body_at({0.0, 0.0, 0.05}, bumpy(2, 10.0))}, settings);
+  BodyWorld::Hand hand;
+  hand.stiffness_per_s2 = 20000.0;
+  hand.X_WP.translation_m = {0.0, 0.0, 0.15};
+  world.enter_tool(0, hand.X_WP);
+  for (int k = 0; k < 400; ++k) {
+    hand.X_WP.translation_m.z() = std::max(0.15 - 5e-4 * k, 0.08);
+    world.step(hand, kStep_s);
+  }
+  REQUIRE_FALSE(world.contacts().empty());
+  world.place(0, world.motion(0));
+  CHECK(world.step(hand, kStep_s) == BodyWorld::Status::converged);
+  CHECK(world.node_visits() < 10'000);
+}
+
+// The square of its length overflows a double.
+TEST_CASE("a step ends also if the hand is too far away for a path", "[body_world]") {
+  const Scene scene = table();
+  for (const double far_m : {1e6, 1e160, 1e300})
+    for (const Vector3d& direction : {Vector3d(1.0, 0.0, 0.0), Vector3d(0.0, 0.0, 1.0)}) {
+      CAPTURE(far_m, direction.z());
+      BodyWorld world(scene, {body_at({0.0, 0.0, 0.025 + 1e-9}, cube())}, {});
+      BodyWorld::Hand hand;
+      hand.X_WP.translation_m = {0.0, 0.0, 0.1};
+      world.enter_tool(0, hand.X_WP);
+      world.step(hand, kStep_s);
+      hand.X_WP.translation_m += far_m * direction;
+      world.step(hand, kStep_s);
+      CHECK(world.motion(0).X_WB.translation_m.z() > 0.05);
+      CHECK(world.motion(1).X_WB.translation_m.norm() == Approx(0.025));
+    }
 }
 
 TEST_CASE("a step neither allocates nor locks", "[body_world]") {
