@@ -85,7 +85,7 @@ class Led {
 bool are_apart(const Led& led) {
   constexpr double kTool_m = 0.01, kCrate_m = 0.025;
   const Pose& X_WT = led.rendering.X_WQ();
-  const Pose& X_WC = led.rendering.X_WB()[0];
+  const Pose X_WC = led.rendering.X_WB()[0];
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3d sign(corner & 1 ? 1.0 : -1.0, corner & 2 ? 1.0 : -1.0, corner & 4 ? 1.0 : -1.0);
     const Vector3d tool_C_m = inverse(X_WC) * (X_WT * Vector3d(kTool_m * sign));
