@@ -377,7 +377,7 @@ MachineState read_machine_state(std::vector<DeviceProfile> profiles) {
 }
 
 WakeLatency measure_wake_latency(Duration for_so_long) {
-  constexpr Duration kPeriod = std::chrono::milliseconds(1);
+  constexpr Duration kTick = std::chrono::milliseconds(1);
   WakeLatency measured;
   DurationHistogram late;
   std::thread([&] {
@@ -386,7 +386,7 @@ WakeLatency measure_wake_latency(Duration for_so_long) {
     measured.fifo = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority) == 0;
     WallClock clock;
     const TimePoint end = clock.now() + for_so_long;
-    for (TimePoint due = clock.now() + kPeriod; due < end; due = std::max(due, clock.now()) + kPeriod) {
+    for (TimePoint due = clock.now() + kTick; due < end; due = std::max(due, clock.now()) + kTick) {
       clock.sleep_until(due);
       late.add(std::max<Duration>(clock.now() - due, Duration::zero()));
     }

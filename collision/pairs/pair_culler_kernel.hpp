@@ -52,9 +52,9 @@ WRENCHD_INLINE Float8 bounds_separation(const PairBlock& tool, const PairBlock& 
 }
 
 WRENCHD_INLINE float horizontal_min(Float8 x) noexcept {
-  x = lane_min(x, __builtin_shuffle(x, Mask8{4, 5, 6, 7, 0, 1, 2, 3}));
-  x = lane_min(x, __builtin_shuffle(x, Mask8{2, 3, 0, 1, 6, 7, 4, 5}));
-  x = lane_min(x, __builtin_shuffle(x, Mask8{1, 0, 3, 2, 5, 4, 7, 6}));
+  x = lane_min(x, __builtin_shufflevector(x, x, 4, 5, 6, 7, 0, 1, 2, 3));
+  x = lane_min(x, __builtin_shufflevector(x, x, 2, 3, 0, 1, 6, 7, 4, 5));
+  x = lane_min(x, __builtin_shufflevector(x, x, 1, 0, 3, 2, 5, 4, 7, 6));
   return x[0];
 }
 

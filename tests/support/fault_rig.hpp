@@ -147,7 +147,6 @@ class FaultRig {
   TickRecord last_;
   Invariants invariants_;
   std::string violation_;
-  bool armed_ = false;
 };
 
 /// A fault that a test can cause, and the expected reaction.

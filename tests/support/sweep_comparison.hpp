@@ -30,7 +30,7 @@ struct SweepCounts {
 /// and the overlaps.
 class SweepComparison {
  public:
-  explicit SweepComparison(const Scene& scene) : scene_(scene), native_(scene), cgal_(scene) {}
+  explicit SweepComparison(const Scene& scene) : native_(scene), cgal_(scene) {}
 
   /// start: an admissible pose.
   void compare(const Pose& X_start, const Pose& X_end);
@@ -40,7 +40,6 @@ class SweepComparison {
  private:
   void report(const std::string& what, const Pose& X_start, const Pose& X_end);
 
-  const Scene& scene_;
   MeshContacts native_;
   CgalContacts cgal_;
   SweepCounts counts_;

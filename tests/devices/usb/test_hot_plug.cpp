@@ -26,7 +26,7 @@ namespace {
 /// The reference device behind a mock hidraw node, on a thread: it sends reports and receives commands. It
 /// sends the newest report every 2 ms if the host has read the previous one, because the mock node merges
 /// waiting reports.
-class LiveHandle : ReportSink {
+class LiveHandle final : ReportSink {
  public:
   LiveHandle(MockMachine& machine, const MockIdentity& identity)
       : mock_(machine, identity), device_(reference_profile(), settings()), thread_([this] { live(); }) {}
