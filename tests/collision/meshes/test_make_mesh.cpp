@@ -22,7 +22,7 @@ PolygonSoup soup_of(const TriangleMesh& mesh) {
 }
 
 TEST_CASE("every kind of mesh that can be made is a solid of about as many triangles as wanted",
-          "[make_mesh][long]") {
+          "[make_mesh]") {
   for (const MeshKind& kind : mesh_kinds())
     for (const std::size_t triangles : {1000, 3000, 20000}) {
       INFO(kind.name << ' ' << triangles);

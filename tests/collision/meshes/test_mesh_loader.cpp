@@ -107,7 +107,7 @@ std::vector<std::string> files_of(const fs::path& directory) {
   return files;
 }
 
-TEST_CASE("a large mesh is reported and cached, and the cached result is equal", "[mesh_loader][long]") {
+TEST_CASE("a large mesh is reported and cached, and the cached result is equal", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path cache = dir.path() / "cache";
   const TriangleMesh made = make_mesh({"bumpy", 60000});
