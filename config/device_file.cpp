@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = 1 << 16;
+constexpr std::size_t kMostFileBytes = 1 << 16;
 /// bytes of a file name, with room for the suffix of a temporary file
 constexpr std::size_t kMaxNameBytes = 240;
 
@@ -169,7 +169,7 @@ std::optional<std::string> read_device_file(const fs::path& file, const std::str
   struct stat status {};
   if (::fstat(in.get(), &status) != 0 || !S_ISREG(status.st_mode))
     throw ConfigError(file, {}, "is not a regular file" + cure);
-  std::string content(kMostBytes + 1, '\0');
+  std::string content(kMostFileBytes + 1, '\0');
   std::size_t size = 0;
   while (size < content.size()) {
     const ssize_t got = ::read(in.get(), content.data() + size, content.size() - size);
@@ -178,7 +178,7 @@ std::optional<std::string> read_device_file(const fs::path& file, const std::str
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
   }
-  if (size > kMostBytes) throw ConfigError(file, {}, "is larger than 64 KiB" + cure);
+  if (size > kMostFileBytes) throw ConfigError(file, {}, "is larger than 64 KiB" + cure);
   content.resize(size);
   return content;
 }

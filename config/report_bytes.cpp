@@ -7,7 +7,7 @@ namespace wrenchd {
 namespace {
 
 /// One packet of a full-speed interrupt endpoint.
-constexpr std::size_t kMostBytes = 64;
+constexpr std::size_t kMostReportBytes = 64;
 
 int digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -53,9 +53,9 @@ bool read_bytes(const TomlValue& value, std::vector<std::uint8_t>& out) {
                  "; write bytes as in \"04 00\"");
     return false;
   }
-  if (parsed.bytes.empty() || parsed.bytes.size() > kMostBytes) {
+  if (parsed.bytes.empty() || parsed.bytes.size() > kMostReportBytes) {
     value.reject("has " + std::to_string(parsed.bytes.size()) + " bytes; a report has 1 to " +
-                 std::to_string(kMostBytes));
+                 std::to_string(kMostReportBytes));
     return false;
   }
   out = parsed.bytes;

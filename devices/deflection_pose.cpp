@@ -13,7 +13,7 @@ namespace {
 constexpr double kMinResponse = 1e-4;
 /// Tolerances for rounding and for the clearance of the proxy. Smaller distances are not corrected.
 constexpr double kDistanceTolerance_m = 1e-7;
-constexpr double kAngleTolerance_rad = 1e-6;
+constexpr double kRoundingAngle_rad = 1e-6;
 
 /// Returns the cosine between a deflection and an offset, clamped to 0 .. 1.
 double alignment(const Vector3d& t, const Vector3d& w) noexcept {
@@ -89,7 +89,7 @@ void DeflectionPose::limit_proxy_distance(const Pose& before, double dt_s) noexc
     V_BH_.linear_m_per_s = step / dt_s;
   }
   const double excess_rad =
-      excess(rotation.norm(), scale * settings_.max_proxy_angle_rad, kAngleTolerance_rad);
+      excess(rotation.norm(), scale * settings_.max_proxy_angle_rad, kRoundingAngle_rad);
   if (excess_rad > 0.0) {
     X_BH_.rotation = (rotation_from(-excess_rad * rotation.normalized()) * X_BH_.rotation).normalized();
     const Vector3d step = clamp_norm(rotation_vector(X_BH_.rotation * before.rotation.conjugate()),

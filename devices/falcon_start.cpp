@@ -11,8 +11,6 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::array<std::uint8_t, 3> kHandshake = {0x0a, 0x43, 0x0d};
-constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 constexpr std::array<std::uint8_t, 1> kReady = {0x41};
 constexpr int kMaxHandshakes = 100;
 constexpr std::size_t kBlock = 128;
@@ -39,9 +37,10 @@ std::vector<std::uint8_t> read_all(SerialChip& chip, std::size_t wanted) {
 
 bool perform_handshake(SerialChip& chip) {
   for (int i = 0; i < kMaxHandshakes; ++i) {
-    chip.write(kHandshake);
-    const auto answer = read_all(chip, kHandshakeReply.size());
-    if (std::equal(answer.begin(), answer.end(), kHandshakeReply.begin(), kHandshakeReply.end())) return true;
+    chip.write(kFalconHandshake);
+    const auto answer = read_all(chip, kFalconHandshakeReply.size());
+    if (std::equal(answer.begin(), answer.end(), kFalconHandshakeReply.begin(), kFalconHandshakeReply.end()))
+      return true;
   }
   return false;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -39,6 +40,10 @@ bool falcon_answers(SerialChip& chip);
 /// unchanged; otherwise starts it with the firmware in the file. Throws std::runtime_error, also if a
 /// firmware is needed and no file is named. Not RT-safe: reads a file, may take seconds.
 void falcon_open(SerialChip& chip, const std::string& firmware_file);
+
+// What the driver sends to the boot loader, and the answer, for drivers and emulators.
+inline constexpr std::array<std::uint8_t, 3> kFalconHandshake = {0x0a, 0x43, 0x0d};
+inline constexpr std::array<std::uint8_t, 4> kFalconHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 
 // Vendor requests of the FTDI chip and their values, for drivers and emulators.
 inline constexpr std::uint8_t kFtdiReset = 0;

@@ -158,7 +158,7 @@ Matrix3d delta_inverse_jacobian(const Kinematics& k, const JointAngles& t, const
 /// error.
 constexpr int kMaxNewtonSteps = 40;
 constexpr int kMaxHalvings = 12;
-constexpr double kAngleTolerance_rad = 1e-13;
+constexpr double kSolvedAngle_rad = 1e-13;
 /// Accepted angle error if no step reduces it further. The largest rounding error is that of the acos at a
 /// stretched leg.
 constexpr double kAcceptedError_rad = 1e-9;
@@ -176,7 +176,7 @@ std::optional<Pose> delta_from(const Kinematics& k, const JointAngles& target, V
   if (!t) return {};
   Vector3d error = error_of(*t);
   for (int iteration = 0; iteration < kMaxNewtonSteps && is_finite(error); ++iteration) {
-    if (error.cwiseAbs().maxCoeff() < kAngleTolerance_rad) break;
+    if (error.cwiseAbs().maxCoeff() < kSolvedAngle_rad) break;
     Matrix3d J;
     bool invertible = false;
     delta_inverse_jacobian(k, *t, p).computeInverseWithCheck(J, invertible);

@@ -14,7 +14,7 @@ namespace {
 /// Below this angle the series of the Jacobians are exact to double precision.
 constexpr double kSmall_rad = 1e-4;
 
-[[noreturn]] void reject(std::size_t i, const std::string& what) {
+[[noreturn]] void reject_pose(std::size_t i, const std::string& what) {
   throw std::invalid_argument("pose " + std::to_string(i + 1) + " of the recorded path: " + what);
 }
 
@@ -52,18 +52,18 @@ Hermite hermite(double u, const Vector3d& m0, const Vector3d& end, const Vector3
 
 PoseSpline::PoseSpline(const std::vector<TimedPose>& poses) {
   if (poses.empty()) throw std::invalid_argument("the recorded path has no pose");
-  if (poses.front().time_s != 0.0) reject(0, "it is not at time 0");
+  if (poses.front().time_s != 0.0) reject_pose(0, "it is not at time 0");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const auto& [time_s, X] = poses[i];
-    if (!is_finite(time_s) || !is_finite(X)) reject(i, "a number is not finite");
-    if (i > 0 && !(time_s > poses[i - 1].time_s)) reject(i, "times must rise");
+    if (!is_finite(time_s) || !is_finite(X)) reject_pose(i, "a number is not finite");
+    if (i > 0 && !(time_s > poses[i - 1].time_s)) reject_pose(i, "times must rise");
     knots_.push_back({time_s, X, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()});
   }
   for (std::size_t i = 0; i + 1 < knots_.size(); ++i) {
     knots_[i].rotation_rad =
         rotation_vector(knots_[i].X_BG.rotation.conjugate() * knots_[i + 1].X_BG.rotation);
     if (knots_[i].rotation_rad.norm() > kMaxRotation_rad)
-      reject(i + 1, "its rotation from the previous pose is too large to be unambiguous");
+      reject_pose(i + 1, "its rotation from the previous pose is too large to be unambiguous");
   }
   // Mean over both intervals. The axis of a rotation is the same in its start and end frame, so both vectors
   // are in axes of G.

@@ -7,18 +7,18 @@
 namespace wrenchd {
 namespace {
 
-std::atomic<bool> requested{false};
+std::atomic<bool> signalled{false};
 
 }  // namespace
 
 void catch_end_signals() {
   struct sigaction action {};
-  action.sa_handler = [](int) { requested.store(true); };
+  action.sa_handler = [](int) { signalled.store(true); };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaction(signal, &action, nullptr);
 }
 
 bool end_requested() noexcept {
-  return requested.load();
+  return signalled.load();
 }
 
 }  // namespace wrenchd

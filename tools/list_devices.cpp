@@ -8,6 +8,7 @@
 
 #include "config/config_error.hpp"
 #include "devices/discovery/inspected_device.hpp"
+#include "devices/discovery/match_profile.hpp"
 #include "devices/discovery/unusable_devices.hpp"
 #include "devices/profile_reports.hpp"
 
@@ -42,15 +43,6 @@ UsbDevice to_printable(UsbDevice device) {
   return device;
 }
 
-bool claims(const DeviceProfile& profile, UsbId id) {
-  const auto holds = [id](const std::vector<UsbId>& ids) {
-    return std::find(ids.begin(), ids.end(), id) != ids.end();
-  };
-  const auto& vendors = profile.match.usb_vendors_by_layout;
-  return holds(profile.match.usb) || holds(profile.match.usb_by_layout) ||
-         std::find(vendors.begin(), vendors.end(), id.vendor) != vendors.end();
-}
-
 Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profiles) {
   Entry entry{to_printable(device), inspect_device(device), {}, false, false};
   entry.match = match_profile(entry.facts.identity, profiles);
@@ -60,7 +52,7 @@ Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profil
   const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
   entry.related = entry.match.profile || !entry.match.rejection.empty() || multi_axis ||
                   std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
-                    return claims(profile, entry.facts.identity.id);
+                    return lists_id(profile, entry.facts.identity.id);
                   });
   return entry;
 }

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 /// 2 m.
 constexpr double kLargestTool_m = 2.0;
 constexpr double kMillimetre_m = 1e-3;
-constexpr double kMass_kg = 0.2;
+constexpr double kToolMass_kg = 0.2;
 /// Steps in which the tool is lowered onto a mesh to find where it touches.
 constexpr int kLoweringSteps = 500;
 constexpr int kBisections = 40;
@@ -228,7 +228,7 @@ std::string make_new_scene(const NewScene& request, MeshLoader& loader) {
   std::string remarks;
   SceneSettings settings;
   settings.tool.mesh = request.tool;
-  settings.tool.mass_kg = kMass_kg;
+  settings.tool.mass_kg = kToolMass_kg;
   load_as_solid_or_surface(settings.tool, loader, remarks);
   const ToolBody unscaled = load_tool(settings.tool, loader);
   settings.tool.scale = scale_of(request, unscaled.mesh, remarks);

@@ -13,7 +13,7 @@ namespace wrenchd {
 namespace {
 
 constexpr double kSide = 50.0;
-constexpr double kMass_kg = 1.0;
+constexpr double kCubeMass_kg = 1.0;
 constexpr double kStep_s = 0.05;
 constexpr int kSteps = 120;
 
@@ -58,7 +58,7 @@ void move(const Inertia& M, const Wrench& F_T, Twist& V, Pose& X_WP) {
 }  // namespace
 
 Scene paper_scene(double scale) {
-  return {tool_body(cube(), scale * kSide, kMass_kg), {{"plane", Vector3d::UnitY(), 0.0}}};
+  return {tool_body(cube(), scale * kSide, kCubeMass_kg), {{"plane", Vector3d::UnitY(), 0.0}}};
 }
 
 Pose pose_of_example_4_1(double scale) {

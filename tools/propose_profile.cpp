@@ -438,14 +438,6 @@ std::string already_fitting(const DescriptorSource& source, const std::vector<st
                       : text + "# You need the proposal below only for a device with other properties.\n#\n";
 }
 
-bool claims(const DeviceProfile& profile, UsbId id) {
-  const DeviceMatch& match = profile.match;
-  const auto has = [](const auto& list, const auto& x) {
-    return std::find(list.begin(), list.end(), x) != list.end();
-  };
-  return has(match.usb, id) || has(match.usb_by_layout, id) || has(match.usb_vendors_by_layout, id.vendor);
-}
-
 }  // namespace
 
 std::vector<std::string> fitting_profiles(const DescriptorSource& source,
@@ -455,7 +447,7 @@ std::vector<std::string> fitting_profiles(const DescriptorSource& source,
   std::vector<std::string> names;
   for (const DeviceProfile& profile : profiles) {
     const DeviceMatch& match = profile.match;
-    if (profile.transport == Transport::loopback || (source.id && !claims(profile, *source.id))) continue;
+    if (profile.transport == Transport::loopback || (source.id && !lists_id(profile, *source.id))) continue;
     if (match.usage_page && *match.usage_page != usage.page) continue;
     if (match.usage && *match.usage != usage.id) continue;
     if (find_differences(descriptor, expected_reports(profile)).empty()) names.push_back(profile.name);

@@ -123,9 +123,9 @@ ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
         for (const double side : {-kSheet, kSheet}) thick.push_back(p + side * size * *normal);
       if (!plane_normal(thick, size)) return convex_hull(thick);
     }
-  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-  using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
-  std::vector<Kernel::Point_3> points;
+  using HullKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using SurfaceMesh = CGAL::Surface_mesh<HullKernel::Point_3>;
+  std::vector<HullKernel::Point_3> points;
   points.reserve(points_T_m.size());
   for (const Vector3d& p : points_T_m) points.emplace_back(p.x(), p.y(), p.z());
   SurfaceMesh hull;

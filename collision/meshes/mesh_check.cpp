@@ -41,9 +41,9 @@ namespace PMP = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using FacePair = std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>;
-using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
+using DirectedEdge = std::pair<std::size_t, std::size_t>;  ///< from, to
 
-std::string edge_place(const PolygonSoup& soup, const Edge& e) {
+std::string edge_place(const PolygonSoup& soup, const DirectedEdge& e) {
   return format_point(soup.vertices[e.first]) + " to " + format_point(soup.vertices[e.second]);
 }
 
@@ -126,9 +126,9 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
   DefectCount open, crowded, same_direction;
   for_each_edge(half_edges_of(soup), [&](std::span<const HalfEdge> half_edges) {
     const auto where = [&] {
-      const Edge& e = half_edges[0].edge;
+      const DirectedEdge& e = half_edges[0].edge;
       const bool as_stored = half_edges[0].forward || half_edges.size() > 2;
-      return "the edge from " + edge_place(soup, as_stored ? e : Edge(e.second, e.first));
+      return "the edge from " + edge_place(soup, as_stored ? e : DirectedEdge(e.second, e.first));
     };
     const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(half_edges[k].face)); };
     if (half_edges.size() == 1)

@@ -7,7 +7,7 @@ namespace wrenchd {
 namespace {
 
 /// Members of an event that are its number, in the order of precedence.
-constexpr std::array kNumbers = {"value", "scale", "distance_m", "rendering_id"};
+constexpr std::array kNumberKeys = {"value", "scale", "distance_m", "rendering_id"};
 
 RecordedEvent recorded(const FeedEvent& event, std::int64_t time_ns) {
   RecordedEvent to;
@@ -15,7 +15,7 @@ RecordedEvent recorded(const FeedEvent& event, std::int64_t time_ns) {
   to.severity = event.level;
   to.name = event.name;
   to.text = event.text;
-  for (const char* const key : kNumbers)
+  for (const char* const key : kNumberKeys)
     if (const auto number = event.fields.find(key); number != event.fields.end() && number->is_number()) {
       to.value = number->get<double>();
       break;

@@ -118,7 +118,7 @@ struct Compared {
   Compared {                                                                   \
 #member, [](const TickRecord& r) { return static_cast<double>(r.member); } \
   }
-constexpr std::array kNumbers = {
+constexpr std::array kComparedNumbers = {
     WRENCHD_COMPARED(energy),
     WRENCHD_COMPARED(kkt_residual),
     WRENCHD_COMPARED(authority),
@@ -152,7 +152,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_external", then.F_external, now.F_external)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
-  for (const Compared& number : kNumbers) {
+  for (const Compared& number : kComparedNumbers) {
     const double a = number.of(then), b = number.of(now);
     if (std::bit_cast<std::uint64_t>(a) != std::bit_cast<std::uint64_t>(b))
       return Difference{0, then.tick, number.name, a, b};
@@ -244,7 +244,7 @@ std::optional<Difference> HandReplay::step() {
 const char* compared_fields() {
   static const std::string names = [] {
     std::string text = "X_WP, X_WQ, X_WB, eps, F_T, F_external, F_out";
-    for (const Compared& number : kNumbers) text += std::string(", ") + number.name;
+    for (const Compared& number : kComparedNumbers) text += std::string(", ") + number.name;
     return text;
   }();
   return names.c_str();

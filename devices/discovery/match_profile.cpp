@@ -117,6 +117,15 @@ std::string text(UsbId id) {
   return hex(id.vendor) + ":" + hex(id.product);
 }
 
+bool lists_id(const DeviceProfile& profile, UsbId id) noexcept {
+  const auto holds = [](const auto& list, const auto& x) {
+    return std::find(list.begin(), list.end(), x) != list.end();
+  };
+  const DeviceMatch& match = profile.match;
+  return holds(match.usb, id) || holds(match.usb_by_layout, id) ||
+         holds(match.usb_vendors_by_layout, id.vendor);
+}
+
 MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
                           std::string_view named, bool serial_named) {
   MatchResult result;

@@ -37,6 +37,10 @@ struct MatchResult {
   std::vector<std::string> rejections;
 };
 
+/// Returns true if the profile names this id, or its vendor, among those that it matches, whatever else it
+/// requires. Not RT-safe: lists of any length.
+bool lists_id(const DeviceProfile& profile, UsbId id) noexcept;
+
 /// Finds the profile of a device. If several match, a profile that names the serial number has priority, then
 /// one that names the product string, then one that names the id in `usb` over one in `usb_by_layout`, and
 /// the latter over one that names the vendor only. If two profiles have equal priority, no profile is used.

@@ -28,7 +28,7 @@ struct Release {
   void operator()(udev_device* d) const noexcept { udev_device_unref(d); }
 };
 using Udev = std::unique_ptr<udev, Release>;
-using Device = std::unique_ptr<udev_device, Release>;
+using UdevDevice = std::unique_ptr<udev_device, Release>;
 
 constexpr int kHubClass = 9;
 
@@ -47,17 +47,17 @@ int number(std::string_view digits, int base) {
 }
 
 /// Returns all devices of a subsystem, in arbitrary order.
-std::vector<Device> devices_of(udev* context, const char* subsystem) {
+std::vector<UdevDevice> devices_of(udev* context, const char* subsystem) {
   const std::unique_ptr<udev_enumerate, Release> found(udev_enumerate_new(context));
   udev_enumerate_add_match_subsystem(found.get(), subsystem);
   if (udev_enumerate_scan_devices(found.get()) < 0)
     throw std::runtime_error(std::string("udev cannot list the devices of subsystem ") + subsystem +
                              "; is /sys mounted?");
-  std::vector<Device> devices;
+  std::vector<UdevDevice> devices;
   for (udev_list_entry* entry = udev_enumerate_get_list_entry(found.get()); entry != nullptr;
        entry = udev_list_entry_get_next(entry)) {
     // skips a device that was unplugged in the meantime
-    if (Device device(udev_device_new_from_syspath(context, udev_list_entry_get_name(entry))); device)
+    if (UdevDevice device(udev_device_new_from_syspath(context, udev_list_entry_get_name(entry))); device)
       devices.push_back(std::move(device));
   }
   return devices;
@@ -178,7 +178,7 @@ std::vector<UsbDevice> list_usb_devices() {
 
   // First the HID interfaces, by the path of their USB interface.
   std::map<std::string, std::vector<UsbDevice>> on_usb;
-  for (const Device& hidraw : devices_of(context.get(), "hidraw")) {
+  for (const UdevDevice& hidraw : devices_of(context.get(), "hidraw")) {
     udev_device* const hid = udev_device_get_parent_with_subsystem_devtype(hidraw.get(), "hid", nullptr);
     if (hid == nullptr) continue;
     UsbDevice device = from_hidraw(hidraw.get(), hid);
@@ -192,7 +192,7 @@ std::vector<UsbDevice> list_usb_devices() {
     }
   }
 
-  for (const Device& interface : devices_of(context.get(), "usb")) {
+  for (const UdevDevice& interface : devices_of(context.get(), "usb")) {
     if (text(udev_device_get_devtype(interface.get())) != "usb_interface") continue;
     if (number(attribute(interface.get(), "bInterfaceClass"), 16) == kHubClass) continue;
     udev_device* const usb =

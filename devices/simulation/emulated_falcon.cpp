@@ -11,8 +11,6 @@ constexpr Duration kFalconFrame = std::chrono::milliseconds(1);
 constexpr std::size_t kPacket = 16;
 constexpr std::size_t kShortPacket = 14;
 constexpr std::uint8_t kStartMarker = '<', kEndMarker = '>', kNibble = 'A';
-constexpr std::array<std::uint8_t, 3> kHandshake = {0x0a, 0x43, 0x0d};
-constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 constexpr unsigned kHomingBit = 1;
 
 int decode_word(std::span<const std::uint8_t> nibbles) noexcept {
@@ -69,14 +67,15 @@ void EmulatedFalcon::write(std::span<const std::uint8_t> bytes) {
 void EmulatedFalcon::take_serial(std::uint8_t byte) {
   if (state_ == State::awaiting_handshake && dtr_ && divisor_ == kFtdi9600Baud) {
     handshake_bytes_.push_back(byte);
-    if (handshake_bytes_.size() > kHandshake.size()) handshake_bytes_.erase(handshake_bytes_.begin());
-    if (!std::equal(handshake_bytes_.begin(), handshake_bytes_.end(), kHandshake.begin(), kHandshake.end()))
+    if (handshake_bytes_.size() > kFalconHandshake.size()) handshake_bytes_.erase(handshake_bytes_.begin());
+    if (!std::equal(handshake_bytes_.begin(), handshake_bytes_.end(), kFalconHandshake.begin(),
+                    kFalconHandshake.end()))
       return;
     handshake_bytes_.clear();
     if (handshakes_to_ignore_ > 0)
       --handshakes_to_ignore_;
     else
-      reply_bytes_.assign(kHandshakeReply.begin(), kHandshakeReply.end());
+      reply_bytes_.assign(kFalconHandshakeReply.begin(), kFalconHandshakeReply.end());
     return;
   }
   if (divisor_ != kFtdiLoaderSpeed || dtr_) return;

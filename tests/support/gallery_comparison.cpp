@@ -17,7 +17,7 @@ namespace {
 constexpr double kTolerance = 1e-9;    // [m], [rad]
 constexpr double kEqualHands = 1e-11;  // [m], [rad]
 
-constexpr std::uint32_t kUnlimited = 1000000000;
+constexpr std::uint32_t kUnlimitedVisits = 1000000000;
 
 bool settled(std::uint8_t status) {
   return static_cast<ProjectionStatus>(status) == ProjectionStatus::converged ||
@@ -79,7 +79,7 @@ FollowedRun follow(const GalleryRun& run, const Scene& scene, ContactBackend con
   // The kernels would defer work to the next tick where CGAL does not. Then the contacts are found elsewhere
   // on the path and held open by another part of the clearance.
   options.work_limit.balanced = false;
-  options.work_limit.node_visits = kUnlimited;
+  options.work_limit.node_visits = kUnlimitedVisits;
   PenetrationDepth depth(scene, options);
   FollowedRun out;
   while (out.first < run.ticks.size() && !proxy_valid(run.ticks[out.first])) ++out.first;

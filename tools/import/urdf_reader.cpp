@@ -210,8 +210,8 @@ class Tree {
     if (const auto given = positions_.find(joint.name); given != positions_.end()) return given->second;
     if (joint.mimic.empty()) return 0.0;
     const auto leader = joints_.find(joint.mimic);
-    constexpr int kMaxDepth = 100;
-    if (leader == joints_.end() || depth > kMaxDepth)
+    constexpr int kMostLeaders = 100;
+    if (leader == joints_.end() || depth > kMostLeaders)
       throw ImportError("joint '" + printable_name(joint.name) + "': mimics '" + printable_name(joint.mimic) +
                         "', which is no joint that can be followed; correct the name");
     return joint.multiplier * position(leader->second, depth + 1) + joint.offset;

@@ -18,16 +18,16 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Triangle = std::array<std::uint32_t, 3>;
+using VertexNumbers = std::array<std::uint32_t, 3>;
 
 /// Crease angle for simplified meshes, where a few cells may turn a smooth surface by more than kCrease_rad.
 constexpr double kCoarseCrease_rad = 1.0;
 
 struct Surface {
   std::vector<Vector3d> vertices;
-  std::vector<Triangle> triangles;
+  std::vector<VertexNumbers> triangles;
 
-  Vector3d area(const Triangle& t) const {
+  Vector3d area(const VertexNumbers& t) const {
     return 0.5 * (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
   }
 };
@@ -72,7 +72,7 @@ Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
     cell.count += 1.0;
     cell_of[i] = &cell;
   }
-  for (const Triangle& t : fine.triangles) {
+  for (const VertexNumbers& t : fine.triangles) {
     const Vector3d area = fine.area(t);
     const double size = area.norm();
     if (size == 0.0) continue;
@@ -85,9 +85,9 @@ Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
   Surface coarse;
   coarse.vertices.resize(cells.size());
   for (const auto& [key, cell] : cells) coarse.vertices[cell.number] = cell.best(side);
-  std::map<Triangle, int> sides;
-  for (const Triangle& t : fine.triangles) {
-    Triangle c = {cell_of[t[0]]->number, cell_of[t[1]]->number, cell_of[t[2]]->number};
+  std::map<VertexNumbers, int> sides;
+  for (const VertexNumbers& t : fine.triangles) {
+    VertexNumbers c = {cell_of[t[0]]->number, cell_of[t[1]]->number, cell_of[t[2]]->number};
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
     std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
     const bool turned = c[1] > c[2];
@@ -106,7 +106,7 @@ Surface coarser(const Surface& fine, std::size_t most) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : fine.vertices) box.extend(p);
   double area = 0.0;
-  for (const Triangle& t : fine.triangles) area += fine.area(t).norm();
+  for (const VertexNumbers& t : fine.triangles) area += fine.area(t).norm();
   // Gives about two triangles per cell that the surface intersects.
   double side = std::max(std::sqrt(2.0 * area / static_cast<double>(most)), box.sizes().maxCoeff() / 2e6);
   constexpr int kTries = 20;
@@ -124,7 +124,7 @@ struct Around {
   std::vector<std::uint32_t> begin, triangles;
 
   explicit Around(const Surface& s) : begin(s.vertices.size() + 1, 0), triangles(3 * s.triangles.size()) {
-    for (const Triangle& t : s.triangles)
+    for (const VertexNumbers& t : s.triangles)
       for (const std::uint32_t v : t) ++begin[v + 1];
     for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
     std::vector<std::uint32_t> at(begin.begin(), begin.end() - 1);
@@ -144,7 +144,7 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
   const double crease_cosine = std::cos(kCrease_rad);
   const double line_cosine = made_coarser ? std::cos(kCoarseCrease_rad) : crease_cosine;
   std::vector<Vector3d> areas, normals;
-  for (const Triangle& t : s.triangles) {
+  for (const VertexNumbers& t : s.triangles) {
     areas.push_back(s.area(t));
     normals.push_back(areas.back().stableNormalized());
   }
@@ -172,7 +172,7 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
       int others = 0;
       double straightest = -1.0;
       for (const std::uint32_t j : around.of(v)) {
-        const Triangle& t = s.triangles[j];
+        const VertexNumbers& t = s.triangles[j];
         if (j == i || std::find(t.begin(), t.end(), w) == t.end()) continue;
         ++others;
         straightest = std::max(straightest, normals[j].dot(normals[i]));
@@ -187,12 +187,12 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
 
 }  // namespace
 
-DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triangle> triangles,
+DisplayMesh display_mesh(std::span<const float> vertices, std::span<const VertexNumbers> triangles,
                          std::size_t most) {
   Surface surface;
   for (std::size_t i = 0; i + 2 < vertices.size(); i += 3)
     surface.vertices.emplace_back(vertices[i], vertices[i + 1], vertices[i + 2]);
-  for (const Triangle& t : triangles)
+  for (const VertexNumbers& t : triangles)
     for (const std::uint32_t v : t)
       if (v >= surface.vertices.size())
         throw std::invalid_argument("a triangle refers to vertex " + std::to_string(v) + " of " +
