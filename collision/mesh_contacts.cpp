@@ -254,7 +254,7 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
                        pass.closes ? feature_margin_m_ : sweep_tolerance::kTouch * clearance_m_))
     return {};
   if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < sweep_tolerance::kAnySlope &&
-      is_behind_rim(face_body, triangle, side, pass.p))
+      is_behind_rim(face_body, triangle, side, pass.p, p_start))
     return {};
   const auto ring = vertex_body.ring_of(vertex);
   double rise = 0.0;  // sum of the slopes to the neighbours
@@ -404,11 +404,15 @@ bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, d
   };
   if (slope_tolerance_ < sweep_tolerance::kAnySlope) {
     const MeshSurface::Edge &ea = tool.convex_edges()[pass.edge_a], &eb = surface.convex_edges()[pass.edge_b];
-    if (surface.kind() == MeshSurface::Kind::surface && is_behind_end(surface, eb, n, pass.p, clearance_m_))
-      return false;
-    if (tool.kind() == MeshSurface::Kind::surface &&
-        is_behind_end(tool, ea, -(view.X_OT_end.R.transpose() * n), point_on(tool, ea, x), clearance_m_))
-      return false;
+    if (surface.kind() == MeshSurface::Kind::surface) {
+      const Vector3d a_start = pass.a0_start + x * pass.da_start;
+      if (is_behind_end(surface, eb, pass.p, pass.p + clearance_m_ * n, a_start)) return false;
+    }
+    if (tool.kind() == MeshSurface::Kind::surface) {
+      const Vector3d p_T = point_on(tool, ea, x), n_T = view.X_OT_end.R.transpose() * n;
+      if (is_behind_end(tool, ea, p_T, p_T - clearance_m_ * n_T, view.X_OT_start.inverse_transform(pass.p)))
+        return false;
+    }
   }
   for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
     for (int k = 0; k < 3 && t != MeshSurface::kNone; ++k)

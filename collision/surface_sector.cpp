@@ -2,6 +2,7 @@
 #include "collision/surface_sector.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +13,7 @@ namespace {
 constexpr double kSlope = 1e-3;
 /// Faces around a vertex that are tested. At a vertex with more of them, each side counts.
 constexpr int kMaxStar = 64;
+constexpr std::array kCorners = {0, 1, 2};
 
 /// Squared distance of x from a triangle with the corner `apex`, as if its other side were far away.
 double distance2_from_corner(const Vector3d& x, const Vector3d& apex, const Vector3d& a, const Vector3d& b,
@@ -66,7 +68,7 @@ bool is_in_sector(const MeshSurface& surface, const MeshSurface::Edge& edge, std
 }  // namespace
 
 bool is_behind_rim(const MeshSurface& surface, std::uint32_t triangle, const MeshSurface::Plane& side,
-                   const Vector3d& p) noexcept {
+                   const Vector3d& p, const Vector3d& p_start) noexcept {
   const Vector3d& normal = surface.planes()[triangle].normal;
   for (int i = 0; i < 3; ++i) {
     const std::uint32_t beside = surface.neighbour(triangle, static_cast<std::size_t>(i));
@@ -75,22 +77,27 @@ bool is_behind_rim(const MeshSurface& surface, std::uint32_t triangle, const Mes
     const Vector3d& a = surface.corner_m(triangle, i);
     const Vector3d along = surface.corner_m(triangle, i == 2 ? 0 : i + 1) - a;
     if (normal.cross(along).dot(p - a) >= 0.0) continue;
-    for (int k = 0; k < 3; ++k) {
+    const bool rises = std::any_of(kCorners.begin(), kCorners.end(), [&](int k) {
       const Vector3d from_border = surface.corner_m(beside, k) - a;
-      if (side.normal.dot(from_border) > kSlope * from_border.norm()) return true;
-    }
+      return side.normal.dot(from_border) > kSlope * from_border.norm();
+    });
+    // The front of the face beside is where this face is.
+    const Vector3d& across = surface.planes()[beside].normal;
+    const double front = across.dot(surface.corner_m(triangle, i == 0 ? 2 : i - 1) - a);
+    if (rises && front * across.dot(p_start - a) <= 0.0) return true;
   }
   return false;
 }
 
-bool is_behind_end(const MeshSurface& surface, const MeshSurface::Edge& edge, const Vector3d& n,
-                   const Vector3d& p, double clearance_m) noexcept {
+bool is_behind_end(const MeshSurface& surface, const MeshSurface::Edge& edge, const Vector3d& p,
+                   const Vector3d& x, const Vector3d& x_start) noexcept {
   if (edge.is_border()) return false;
   for (std::size_t i = 0; i < 2; ++i) {
     const Vector3d &end = surface.vertices_m()[edge.vertices[i]],
                    &other = surface.vertices_m()[edge.vertices[1 - i]];
     if ((p - end).dot(other - end) < 0.0)
-      return !is_in_sector(surface, edge, edge.vertices[i], p + clearance_m * n);
+      return !is_in_sector(surface, edge, edge.vertices[i], x) &&
+             !is_in_sector(surface, edge, edge.vertices[i], x_start);
   }
   return false;
 }

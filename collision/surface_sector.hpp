@@ -9,14 +9,18 @@
 // On which side of a surface a tool is, near the border of a feature. A sweep meets a feature also a little
 // beyond its border, because paths are not quite straight. Beyond the border of a face, and beyond the end of
 // an edge, the tool may be on the other side of the surface: it slides over the rim of a pocket and passes
-// the far side of the pocket's wall, which must not hold it. core/METHOD.md, section 14.10.
+// the far side of the pocket's wall, which must not hold it. The start of the path decides, where the pose is
+// exact: a tool in a valley, which passes its border by the same little, stays held. core/METHOD.md, section
+// 14.10.
 
 namespace wrenchd {
 
-/// Returns true if a face beside this one rises above `side`, its plane with the normal towards a tool, and p
-/// lies beyond the border between them. RT-safe.
+/// Returns true if a face beside this one rises above `side`, its plane with the normal towards a tool, and a
+/// point of the tool is behind that face: p, where it passes the plane, lies beyond the border between the
+/// faces, and p_start, where it was at the start of the path, is behind the plane of the face beside.
+/// RT-safe.
 bool is_behind_rim(const MeshSurface& surface, std::uint32_t triangle, const MeshSurface::Plane& side,
-                   const Vector3d& p) noexcept;
+                   const Vector3d& p, const Vector3d& p_start) noexcept;
 
 /// Returns the point of an edge, or of its extension, at a fraction of the way to its second vertex [m].
 /// RT-safe.
@@ -27,9 +31,9 @@ inline Vector3d point_on(const MeshSurface& surface, const MeshSurface::Edge& ed
 }
 
 /// Returns true if p, the point of an edge nearest to an edge of the other body, lies beyond an end of its
-/// edge, and the other body is not in the sector from which the edge is convex. n: unit normal towards the
-/// other body. clearance_m: distance of the other edge. RT-safe.
-bool is_behind_end(const MeshSurface& surface, const MeshSurface::Edge& edge, const Vector3d& n,
-                   const Vector3d& p, double clearance_m) noexcept;
+/// edge, and the other body is not in the sector from which the edge is convex: neither x, its point nearest
+/// to p, nor x_start, where that point was at the start of the path. RT-safe.
+bool is_behind_end(const MeshSurface& surface, const MeshSurface::Edge& edge, const Vector3d& p,
+                   const Vector3d& x, const Vector3d& x_start) noexcept;
 
 }  // namespace wrenchd

@@ -240,7 +240,7 @@ std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass_on_side(
                               pass.closes ? feature_margin_m_ : kTouch * clearance_m_))
     return {};
   if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < kAnySlope &&
-      is_behind_rim(face_body, triangle, side, pass.p_m))
+      is_behind_rim(face_body, triangle, side, pass.p_m, p_start))
     return {};
   const auto ring = vertex_body.ring_of(vertex);
   double rise = 0.0;  // sum of the slopes to the neighbours
@@ -346,12 +346,17 @@ bool CgalContacts::edges_touch(const EdgePass& pass, double sign, double fractio
   if (point_O_m != nullptr) *point_O_m = p_O_m;
   if (slope_tolerance_ < kAnySlope) {
     const MeshSurface::Edge &ea = tool.convex_edges()[pass.edge_a], &eb = surface.convex_edges()[pass.edge_b];
-    if (surface.kind() == MeshSurface::Kind::surface && is_behind_end(surface, eb, n, p_O_m, clearance_m_))
-      return false;
     const double x = w.cross(at.db).dot(N) / NN;
-    if (tool.kind() == MeshSurface::Kind::surface &&
-        is_behind_end(tool, ea, -(pass.view.X_OT_end.R.transpose() * n), point_on(tool, ea, x), clearance_m_))
-      return false;
+    if (surface.kind() == MeshSurface::Kind::surface) {
+      const Vector3d a_start = pass.start.a0 + x * pass.start.da;
+      if (is_behind_end(surface, eb, p_O_m, p_O_m + clearance_m_ * n, a_start)) return false;
+    }
+    if (tool.kind() == MeshSurface::Kind::surface) {
+      const Vector3d p_T = point_on(tool, ea, x), n_T = pass.view.X_OT_end.R.transpose() * n;
+      if (is_behind_end(tool, ea, p_T, p_T - clearance_m_ * n_T,
+                        pass.view.X_OT_start.inverse_transform(p_O_m)))
+        return false;
+    }
   }
   const auto falls_away = [&](const Vector3d& from_edge, double side) {
     return exact::rises(side * n, from_edge, slope_tolerance_ * from_edge.norm());
