@@ -81,7 +81,7 @@ bool is_behind_rim(const MeshSurface& surface, std::uint32_t triangle, const Mes
       const Vector3d from_border = surface.corner_m(beside, k) - a;
       return side.normal.dot(from_border) > kSlope * from_border.norm();
     });
-    // The front of the face beside is where this face is.
+    // A tool in the valley between the two faces is on that side of the face beside where this face is.
     const Vector3d& across = surface.planes()[beside].normal;
     const double front = across.dot(surface.corner_m(triangle, i == 0 ? 2 : i - 1) - a);
     if (rises && front * across.dot(p_start - a) <= 0.0) return true;

@@ -9,9 +9,9 @@
 // On which side of a surface a tool is, near the border of a feature. A sweep meets a feature also a little
 // beyond its border, because paths are not quite straight. Beyond the border of a face, and beyond the end of
 // an edge, the tool may be on the other side of the surface: it slides over the rim of a pocket and passes
-// the far side of the pocket's wall, which must not hold it. The start of the path decides, where the pose is
-// exact: a tool in a valley, which passes its border by the same little, stays held. core/METHOD.md, section
-// 14.10.
+// the far side of the pocket's wall, which must not hold it. A tool that a valley holds may also seem to pass
+// a border, by the deviation of the path from a straight line. The start of the path tells the two apart,
+// because the pose there is exact. core/METHOD.md, section 14.10.
 
 namespace wrenchd {
 

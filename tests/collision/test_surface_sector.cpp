@@ -88,8 +88,8 @@ TEST_CASE("a tool that was in the corner of the tray at the start of its path st
   for (const bool inside_out : {false, true}) {
     const MeshSurface surface = tray_surface(inside_out);
     const auto [wall, inward] = face_at_x(surface, 0.05, -1.0);
-    // The wall at y = 0.05 rises beside it. Where the path passes the plane, it is beyond the border by an
-    // arc's deviation.
+    // The wall at y = 0.05 rises beside it. The tool passes the plane of the first wall a little behind the
+    // second.
     const Vector3d beyond(0.05, 0.05 + kOver_m, -0.01);
     for (std::uint32_t t = 0; t < surface.triangles().size(); ++t) {
       if (surface.planar_region(t) != surface.planar_region(wall)) continue;
@@ -101,7 +101,7 @@ TEST_CASE("a tool that was in the corner of the tray at the start of its path st
           is_behind || (surface.planar_region(t) == surface.planar_region(wall) &&
                         is_behind_rim(surface, t, inward, beyond, beyond + Vector3d(-kStep_m, kStep_m, 0.0)));
     CHECK(is_behind);
-    // The upright edge of the corner is a ridge from inside the material, also for a point below the floor.
+    // The edge between the two walls is convex from inside the material. Above the rim there is no material.
     const MeshSurface::Edge& upright = edge_between(surface, 10, 14);
     const Vector3d diagonal = Vector3d(1.0, 1.0, 0.0).normalized(), rim(0.05, 0.05, kOver_m);
     CHECK_FALSE(is_behind_end(surface, upright, rim, rim + kClearance_m * diagonal,
