@@ -6,19 +6,19 @@
 namespace wrenchd {
 namespace {
 
-thread_local std::string prefix;
+thread_local std::string thread_prefix;
 
 }  // namespace
 
 LogPrefix::LogPrefix(const std::string& hand)
-    : previous_(std::exchange(prefix, hand.empty() ? std::string() : hand + ": ")) {}
+    : previous_(std::exchange(thread_prefix, hand.empty() ? std::string() : hand + ": ")) {}
 
 LogPrefix::~LogPrefix() {
-  prefix = std::move(previous_);
+  thread_prefix = std::move(previous_);
 }
 
 const std::string& LogPrefix::current() noexcept {
-  return prefix;
+  return thread_prefix;
 }
 
 }  // namespace wrenchd

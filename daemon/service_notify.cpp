@@ -14,7 +14,7 @@ namespace wrenchd {
 namespace {
 
 /// Longest time between two messages.
-constexpr auto kPeriod = std::chrono::milliseconds(100);
+constexpr auto kNotifyPeriod = std::chrono::milliseconds(100);
 /// Messages within the watchdog time of the service manager. This thread has no real-time priority, so some
 /// messages may be late on a busy machine.
 constexpr int kMessagesPerWatchdog = 8;
@@ -26,8 +26,8 @@ std::string to_one_line(std::string text) {
 
 std::chrono::microseconds message_period() {
   std::uint64_t watchdog_us = 0;
-  if (sd_watchdog_enabled(0, &watchdog_us) <= 0) return kPeriod;
-  return std::min<std::chrono::microseconds>(kPeriod,
+  if (sd_watchdog_enabled(0, &watchdog_us) <= 0) return kNotifyPeriod;
+  return std::min<std::chrono::microseconds>(kNotifyPeriod,
                                              std::chrono::microseconds(watchdog_us / kMessagesPerWatchdog));
 }
 

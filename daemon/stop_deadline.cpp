@@ -12,7 +12,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr auto kPeriod = std::chrono::milliseconds(20);
+constexpr auto kCheckPeriod = std::chrono::milliseconds(20);
 
 }  // namespace
 
@@ -31,7 +31,7 @@ StopDeadline::~StopDeadline() {
 void StopDeadline::run(const std::stop_token& stop) {
   std::chrono::steady_clock::duration used{0}, used_recording{0};
   auto last = std::chrono::steady_clock::now();
-  for (; !stop.stop_requested(); std::this_thread::sleep_for(kPeriod)) {
+  for (; !stop.stop_requested(); std::this_thread::sleep_for(kCheckPeriod)) {
     const auto now = std::chrono::steady_clock::now();
     const auto passed = now - std::exchange(last, now);
     if (!started_.load() && !signals_.stop_requested()) continue;

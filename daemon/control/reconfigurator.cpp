@@ -21,7 +21,7 @@ namespace {
 
 /// Longest wait for the crossfade to the previous rendering. It covers the longest soft start. Only a search
 /// for a feasible pose takes longer.
-constexpr auto kMaxWait = std::chrono::seconds(2);
+constexpr auto kMaxCrossfadeWait = std::chrono::seconds(2);
 /// Largest gain of a local model. The loop scales the gain further to what is stable.
 constexpr double kMaxModelGain = 1e5;
 constexpr auto kWaitPeriod = std::chrono::milliseconds(5);
@@ -258,7 +258,7 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
 
 /// Waits until the loop has taken the last rendering and finished its crossfade. Otherwise an obstacle could
 /// start to move before the loop renders it. Returns early if the loop does not tick. Throws BusyError after
-/// kMaxWait.
+/// kMaxCrossfadeWait.
 void Reconfigurator::wait_until_idle() {
   const auto idle = [this] {
     return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading();
@@ -268,7 +268,7 @@ void Reconfigurator::wait_until_idle() {
     throw BusyError("another change of the rendering is in progress; repeat the request in a moment");
   };
   if (proxy_search_mode_ == ProxySearchMode::in_tick) busy();
-  const auto end = std::chrono::steady_clock::now() + kMaxWait;
+  const auto end = std::chrono::steady_clock::now() + kMaxCrossfadeWait;
   const std::uint64_t ticks = loop_.telemetry().timing().tick.count();
   while (!idle()) {
     if (std::chrono::steady_clock::now() > end) {

@@ -23,7 +23,7 @@ constexpr auto kWritePeriod = 100ms;
 /// Duration after a fault that the flight recorder writes.
 constexpr Duration kAfterFault = 1s;
 /// Longest wait for the ticks after a fault. A loop that has ended or stalled produces none.
-constexpr Duration kMaxWait = 2500ms;
+constexpr Duration kMaxTickWait = 2500ms;
 /// The history exceeds flight_s by kAfterFault and by the largest delay of the writer.
 constexpr double kMargin_s = 4.0;
 /// Shortest history: the longest pause of the disk that loses no tick.
@@ -329,7 +329,7 @@ bool Recordings::write_flight(bool rest) {
   std::unique_lock status(status_mutex_);
   if (!flight_) return false;
   Flight& flight = *flight_;
-  const bool over = rest || std::chrono::steady_clock::now() - flight.requested_at > kMaxWait;
+  const bool over = rest || std::chrono::steady_clock::now() - flight.requested_at > kMaxTickWait;
   if (!flight.recorder && !over && history_.newest_ns() < flight.until_ns) return false;
   status.unlock();  // only this thread changes a flight that has begun
   try {
