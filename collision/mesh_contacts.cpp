@@ -29,21 +29,34 @@ bool projects_inside(const Vector3d& p, const Vector3d& a, const Vector3d& b, co
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), candidates_(scene) {
+MeshContacts::MeshContacts(const Scene& scene, bool tool_passes_nothing)
+    : scene_(scene), candidates_(scene, tool_passes_nothing) {
   remaining_pairs_.resize(BvhTraversal::kCapacity);
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
     obstacle_views_.push_back({&obstacle, scene.first_mesh() + k, Frame(obstacle.X_WO), {}, {}});
   }
+  if (scene.tool_mesh() != nullptr && scene.tool_mesh()->surface.kind() == MeshSurface::Kind::surface)
+    tool_sides_ = MeshSurface::kBothSides;
 }
 
 void MeshContacts::set_start(const Pose& X_WT, double time_s) noexcept {
+  go_on_from(X_WT, time_s);
   X_start_ = X_WT;
   start_time_s_ = time_s;
 }
 
+/// Tells the candidate lists if this pose is neither the start nor the end of a path on which the tool met
+/// nothing.
+void MeshContacts::go_on_from(const Pose& X_WT, double time_s) noexcept {
+  const bool at_start = same_bits(X_WT, X_start_) && time_s == start_time_s_;
+  const bool at_end = same_bits(X_WT, X_free_end_) && time_s == free_end_time_s_;
+  if (!at_start && !at_end) candidates_.tool_was_placed();
+}
+
 void MeshContacts::prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s,
                             std::uint32_t spare_visits) noexcept {
+  go_on_from(X_WT, time_s);
   candidates_.prefetch(X_WT, X_WP, budget, time_s, spare_visits);
   overlap_found_ = false;
   sweep_visits_ = 0;
@@ -73,6 +86,10 @@ MeshContacts::SweepResult MeshContacts::sweep(const Pose& X_WT, double clearance
   if (result.contacts.empty() && !result.overlaps &&
       (overlap_found_ || rotation_rad_ > sweep_tolerance::kNegligibleRotation_rad))
     verify_end_pose(budget, result);
+  if (result.contacts.empty() && !result.overlaps && result.complete) {
+    X_free_end_ = X_WT;
+    free_end_time_s_ = time_s;
+  }
   return result;
 }
 
@@ -104,6 +121,7 @@ void MeshContacts::update_obstacle_views(const Pose& X_WT, double time_s) noexce
   rotation_rad_ = X_start_.rotation.angularDistance(X_WT.rotation);
   for (const std::uint32_t k : candidates_.current().nearby_obstacles()) {
     ObstacleView& view = obstacle_views_[k];
+    view.sides = candidates_.sides_of(k);
     if (!view.obstacle->moves()) {
       view.X_OT_start = start.relative_to(view.X_WO);
       view.X_OT_end = end.relative_to(view.X_WO);
@@ -219,22 +237,25 @@ void MeshContacts::test_pair(const CandidatePair& pair, const MovedTriangle& a,
 
 /// Both features of the pair are in the frame of the face's body, in which the vertex moves straight. So the
 /// gap is a linear function of the path fraction: METHOD (94). at_start, at_end: transform a point of the
-/// vertex's body to the frame of the face's body at both ends of the path.
+/// vertex's body to the frame of the face's body at both ends of the path. sides: those of the face's body on
+/// which the vertex can be.
 template <class AtStart, class AtEnd>
 std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass(
-    const MeshSurface& face_body, std::uint32_t triangle, const MeshSurface& vertex_body,
+    const MeshSurface& face_body, unsigned sides, std::uint32_t triangle, const MeshSurface& vertex_body,
     std::uint32_t vertex, const AtStart& at_start, const AtEnd& at_end) const noexcept {
   const MeshSurface::Plane& front = face_body.planes()[triangle];
-  auto pass = vertex_pass_on_side(front, face_body, triangle, vertex_body, vertex, at_start, at_end);
-  if (pass || face_body.kind() == MeshSurface::Kind::solid) return pass;
+  std::optional<VertexPass> pass;
+  if ((sides & MeshSurface::kFront) != 0)
+    pass = vertex_pass_on_side(front, sides, face_body, triangle, vertex_body, vertex, at_start, at_end);
+  if (pass || (sides & MeshSurface::kBack) == 0) return pass;
   const MeshSurface::Plane back = {-front.normal, -front.offset_m};
-  return vertex_pass_on_side(back, face_body, triangle, vertex_body, vertex, at_start, at_end);
+  return vertex_pass_on_side(back, sides, face_body, triangle, vertex_body, vertex, at_start, at_end);
 }
 
 /// Tests a vertex against one side of a face. side: plane of the face with the normal towards the vertex.
 template <class AtStart, class AtEnd>
 std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
-    const MeshSurface::Plane& side, const MeshSurface& face_body, std::uint32_t triangle,
+    const MeshSurface::Plane& side, unsigned sides, const MeshSurface& face_body, std::uint32_t triangle,
     const MeshSurface& vertex_body, std::uint32_t vertex, const AtStart& at_start,
     const AtEnd& at_end) const noexcept {
   const Vector3d& p_body = vertex_body.vertices_m()[vertex];
@@ -253,7 +274,7 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
                        face_body.corner_m(triangle, 2), face_body.planes()[triangle].normal,
                        pass.closes ? feature_margin_m_ : sweep_tolerance::kTouch * clearance_m_))
     return {};
-  if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < sweep_tolerance::kAnySlope &&
+  if (sides == MeshSurface::kBothSides && slope_tolerance_ < sweep_tolerance::kAnySlope &&
       is_behind_rim(face_body, triangle, side, pass.p, p_start))
     return {};
   const auto ring = vertex_body.ring_of(vertex);
@@ -267,7 +288,7 @@ std::optional<MeshContacts::VertexPass> MeshContacts::vertex_pass_on_side(
   }
   // If slopes are ignored, their sum still shows on which side of a surface the body lies.
   const bool behind = rise < -sweep_tolerance::kSlope * static_cast<double>(ring.size());
-  if (behind && face_body.kind() == MeshSurface::Kind::surface) return {};
+  if (behind && sides == MeshSurface::kBothSides) return {};
   return pass;
 }
 
@@ -278,7 +299,8 @@ void MeshContacts::vertices_on_face(const ObstacleView& view, const CandidatePai
   for (const std::uint32_t vertex : tool.features()[pair.a].vertices) {
     if (vertex == MeshSurface::kNone) continue;
     const auto pass = vertex_pass(
-        surface, pair.b, tool, vertex, [&](const Vector3d& p_T) -> Vector3d { return view.X_OT_start * p_T; },
+        surface, view.sides, pair.b, tool, vertex,
+        [&](const Vector3d& p_T) -> Vector3d { return view.X_OT_start * p_T; },
         [&](const Vector3d& p_T) -> Vector3d { return view.X_OT_end * p_T; });
     if (!pass) continue;
     const Contact contact = vertex_face_contact(view, tool, vertex, pair.b, pass->plane);
@@ -291,9 +313,9 @@ void MeshContacts::face_on_vertices(const ObstacleView& view, const CandidatePai
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = view.obstacle->mesh->surface;
   for (const std::uint32_t vertex : surface.features()[pair.b].vertices) {
-    if (vertex == MeshSurface::kNone) continue;
+    if (vertex == MeshSurface::kNone || (surface.sides_of_vertex(vertex) & view.sides) == 0) continue;
     const auto pass = vertex_pass(
-        tool, pair.a, surface, vertex,
+        tool, tool_sides_, pair.a, surface, vertex,
         [&](const Vector3d& p_O) -> Vector3d { return view.X_OT_start.inverse_transform(p_O); },
         [&](const Vector3d& p_O) -> Vector3d { return view.X_OT_end.inverse_transform(p_O); });
     if (!pass) continue;
@@ -304,10 +326,13 @@ void MeshContacts::face_on_vertices(const ObstacleView& view, const CandidatePai
 
 void MeshContacts::edges_on_edges(const ObstacleView& view, const CandidatePair& pair, const MovedTriangle& a,
                                   SweepResult& result) noexcept {
+  const MeshSurface& surface = view.obstacle->mesh->surface;
   for (const std::uint32_t edge_a : scene_.tool_mesh()->surface.features()[pair.a].edges) {
     if (edge_a == MeshSurface::kNone) continue;
-    for (const std::uint32_t edge_b : view.obstacle->mesh->surface.features()[pair.b].edges)
-      if (edge_b != MeshSurface::kNone) edge_on_edge(view, a, edge_a, edge_b, result);
+    for (const std::uint32_t edge_b : surface.features()[pair.b].edges)
+      if (edge_b != MeshSurface::kNone &&
+          (surface.sides_of(surface.convex_edges()[edge_b]) & view.sides) != 0)
+        edge_on_edge(view, a, edge_a, edge_b, result);
   }
 }
 
@@ -404,11 +429,11 @@ bool MeshContacts::edges_touch(const ObstacleView& view, EdgePairMotion& pass, d
   };
   if (slope_tolerance_ < sweep_tolerance::kAnySlope) {
     const MeshSurface::Edge &ea = tool.convex_edges()[pass.edge_a], &eb = surface.convex_edges()[pass.edge_b];
-    if (surface.kind() == MeshSurface::Kind::surface) {
+    if (view.sides == MeshSurface::kBothSides) {
       const Vector3d a_start = pass.a0_start + x * pass.da_start;
       if (is_behind_end(surface, eb, pass.p, pass.p + clearance_m_ * n, a_start)) return false;
     }
-    if (tool.kind() == MeshSurface::Kind::surface) {
+    if (tool_sides_ == MeshSurface::kBothSides) {
       const Vector3d p_T = point_on(tool, ea, x), n_T = view.X_OT_end.R.transpose() * n;
       if (is_behind_end(tool, ea, p_T, p_T - clearance_m_ * n_T, view.X_OT_start.inverse_transform(pass.p)))
         return false;

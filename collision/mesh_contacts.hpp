@@ -27,8 +27,9 @@ namespace wrenchd {
 /// are RT-safe.
 class MeshContacts final : public SweepQuery {
  public:
-  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
-  explicit MeshContacts(const Scene& scene);
+  /// Keeps a reference to the scene, which must outlive this object. tool_passes_nothing: as in
+  /// PredictiveCandidateList. Not RT-safe: allocates.
+  explicit MeshContacts(const Scene& scene, bool tool_passes_nothing = true);
 
   /// Sets the start of the next sweeps: a pose that is admissible at scene time time_s [s]. RT-safe.
   void set_start(const Pose& X_WT, double time_s = 0.0) noexcept override;
@@ -90,6 +91,7 @@ class MeshContacts final : public SweepQuery {
     double sign;  ///< +1 or -1: orients the cross product of da and db out of the obstacle
   };
 
+  void go_on_from(const Pose& X_WT, double time_s) noexcept;
   void update_obstacle_views(const Pose& X_WT, double time_s) noexcept;
   void test_pairs(VisitBudget& budget, SweepResult& result) noexcept;
   bool plane_separates(const Heights& start_m, const Heights& end_m, double min_gap_m) const noexcept;
@@ -97,14 +99,14 @@ class MeshContacts final : public SweepQuery {
   bool closes(double start_m, double end_m) const noexcept;
   void test_pair(const CandidatePair& pair, const MovedTriangle& a, SweepResult& result) noexcept;
   template <class AtStart, class AtEnd>
-  std::optional<VertexPass> vertex_pass(const MeshSurface& face_body, std::uint32_t triangle,
+  std::optional<VertexPass> vertex_pass(const MeshSurface& face_body, unsigned sides, std::uint32_t triangle,
                                         const MeshSurface& vertex_body, std::uint32_t vertex,
                                         const AtStart& at_start, const AtEnd& at_end) const noexcept;
   template <class AtStart, class AtEnd>
-  std::optional<VertexPass> vertex_pass_on_side(const MeshSurface::Plane& side, const MeshSurface& face_body,
-                                                std::uint32_t triangle, const MeshSurface& vertex_body,
-                                                std::uint32_t vertex, const AtStart& at_start,
-                                                const AtEnd& at_end) const noexcept;
+  std::optional<VertexPass> vertex_pass_on_side(const MeshSurface::Plane& side, unsigned sides,
+                                                const MeshSurface& face_body, std::uint32_t triangle,
+                                                const MeshSurface& vertex_body, std::uint32_t vertex,
+                                                const AtStart& at_start, const AtEnd& at_end) const noexcept;
   void vertices_on_face(const ObstacleView& view, const CandidatePair& pair) noexcept;
   void face_on_vertices(const ObstacleView& view, const CandidatePair& pair) noexcept;
   void edges_on_edges(const ObstacleView& view, const CandidatePair& pair, const MovedTriangle& a,
@@ -122,7 +124,10 @@ class MeshContacts final : public SweepQuery {
 
   Pose X_start_;
   double start_time_s_ = 0.0;
-  std::vector<ObstacleView> obstacle_views_;  ///< one entry for each mesh obstacle of the scene
+  Pose X_free_end_;  ///< end of the last path on which the tool met nothing
+  double free_end_time_s_ = 0.0;
+  unsigned tool_sides_ = MeshSurface::kFront;  ///< sides of the tool's mesh on which an obstacle can be
+  std::vector<ObstacleView> obstacle_views_;   ///< one entry for each mesh obstacle of the scene
   double clearance_m_ = 0.0;
   /// largest displacement of any tool point over all obstacle frames [m]
   double displacement_bound_m_ = 0.0;

@@ -77,6 +77,7 @@ struct ObstacleView {
   std::uint32_t number;  ///< number of the obstacle in the scene
   Frame X_WO;            ///< pose of the obstacle at the end of the path
   Frame X_OT_start, X_OT_end;
+  unsigned sides = MeshSurface::kFront;  ///< sides of the obstacle's mesh on which the tool can be
 };
 
 /// The contact of a vertex of the tool and a face of the obstacle. plane: plane of the face in O, with the

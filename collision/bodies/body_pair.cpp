@@ -12,7 +12,7 @@ double displacement_bound_m(const BodyPath& path, double radius_m) noexcept {
 }
 
 BodyPair::BodyPair(std::size_t a, std::size_t b, Scene scene)
-    : a_(a), b_(b), scene_(std::move(scene)), half_spaces_(scene_), contacts_(scene_) {}
+    : a_(a), b_(b), scene_(std::move(scene)), half_spaces_(scene_), contacts_(scene_, false) {}
 
 Pose BodyPair::in_b(const Pose& X_WA, const Pose& X_WB) const noexcept {
   return is_fixed() ? X_WA : inverse(X_WB) * X_WA;

@@ -44,12 +44,15 @@ struct MeshBvh {
   template <class Use>
   void visit_members(const Use& use) {
     surface.visit_members(use), bvh.visit_members(use);
-    use(surface_tolerance_m), use(loaded.vertices_m), use(loaded.triangles), use(source_vertex),
-        use(source_triangle);
+    use(divides_space), use(surface_tolerance_m), use(loaded.vertices_m), use(loaded.triangles),
+        use(source_vertex), use(source_triangle);
   }
 
   MeshSurface surface;
   TriangleBvh bvh;
+  /// True for a closed surface (MeshSurface::is_closed()) of which is known that it does not intersect
+  /// itself.
+  bool divides_space = false;
   double surface_tolerance_m = 0.0;            ///< largest distance of `surface` from loaded_mesh() [m]
   TriangleMesh loaded;                         ///< empty if `surface` is the mesh as loaded
   std::vector<std::uint32_t> source_vertex;    ///< empty if `surface` is the mesh as loaded

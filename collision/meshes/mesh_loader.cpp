@@ -14,6 +14,7 @@
 #include "collision/meshes/mesh_source.hpp"
 #include "collision/meshes/mesh_union.hpp"
 #include "collision/meshes/packer.hpp"
+#include "collision/meshes/self_intersection.hpp"
 
 namespace wrenchd {
 namespace {
@@ -355,8 +356,10 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
     report_progress(file, std::max(triangles, surface.mesh.triangles.size()),
                     "finding its edges and building its BVH");
     const bool changed = surface.distance_m > 0.0 || surface.mesh.triangles.size() < triangles;
-    if (surface.mesh.triangles.empty() || !changed) return MeshBvh(mesh, kind);
-    return MeshBvh(std::move(surface), mesh, kind);
+    MeshBvh made = surface.mesh.triangles.empty() || !changed ? MeshBvh(mesh, kind)
+                                                              : MeshBvh(std::move(surface), mesh, kind);
+    made.divides_space = made.surface.is_closed() && !intersects_itself(made.surface.mesh());
+    return made;
   }));
   const std::size_t used = bvh->surface.triangles().size();
   const bool is_other = used != triangles || bvh->surface_tolerance_m > 0.0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "core/least_distance.hpp"
@@ -26,28 +27,29 @@ constexpr int next(int i) noexcept {
   return i == 2 ? 0 : i + 1;
 }
 
-/// Returns true if a direction n exists with n . e < 0 for all directions e. Searches the direction of
+/// Returns a direction n with n . e < 0 for all directions e, if there is one. Searches the direction of
 /// steepest descent with the least-distance problem  min |z|  s.t.  -e . z >= 1.  Rows are added a few at a
 /// time, because a vertex may have any number of neighbours.
-bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& first_guess) {
+std::optional<Vector3d> direction_above(const std::vector<Vector3d>& directions,
+                                        const Vector3d& first_guess) {
   const auto worst_of = [&](const Vector3d& n) {
     return *std::max_element(directions.begin(), directions.end(),
                              [&](const Vector3d& a, const Vector3d& b) { return n.dot(a) < n.dot(b); });
   };
-  if (first_guess.dot(worst_of(first_guess)) < -kMinFallAngle_rad) return true;
+  if (first_guess.dot(worst_of(first_guess)) < -kMinFallAngle_rad) return first_guess;
   constexpr std::size_t kRows = 32;
   LeastDistance<3, kRows> problem;
   Vector3d n = first_guess;
   for (std::size_t row = 0; row < kRows; ++row) {
     const Vector3d worst = worst_of(n);
-    if (row > 0 && n.dot(worst) < -kMinFallAngle_rad) return true;
+    if (row > 0 && n.dot(worst) < -kMinFallAngle_rad) return n;
     problem.add_unit(-worst, 1.0);
-    if (problem.solve(Vector3d::Zero(), 1e-12) != decltype(problem)::Status::optimal) return false;
+    if (problem.solve(Vector3d::Zero(), 1e-12) != decltype(problem)::Status::optimal) return {};
     const double length = problem.z().norm();
-    if (length * kMinFallAngle_rad > 1.0) return false;
+    if (length * kMinFallAngle_rad > 1.0) return {};
     n = problem.z() / length;
   }
-  return false;
+  return {};
 }
 
 }  // namespace
@@ -56,6 +58,7 @@ MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)),
   for (const Vector3d& p : mesh_.vertices_m) radius_m_ = std::max(radius_m_, p.norm());
   features_.assign(mesh_.triangles.size(), {{kNone, kNone, kNone}, {kNone, kNone, kNone}});
   const std::vector<CrowdedEdge> crowded = find_neighbours();
+  is_closed_ = kind_ == Kind::surface && find_closed(crowded);
   find_planes();
   find_convex_edges(crowded);
   find_convex_vertices();
@@ -99,6 +102,37 @@ std::vector<MeshSurface::CrowdedEdge> MeshSurface::find_neighbours() {
     i = end;
   }
   return crowded;
+}
+
+/// Returns true if every side has a neighbour that is wound alike, and all triangles are reached from the
+/// first one.
+bool MeshSurface::find_closed(const std::vector<CrowdedEdge>& crowded) const {
+  if (!crowded.empty() || mesh_.triangles.empty()) return false;
+  std::vector<bool> reached(mesh_.triangles.size(), false);
+  std::vector<std::uint32_t> front = {0};
+  reached[0] = true;
+  std::size_t count = 0;
+  while (!front.empty()) {
+    const std::uint32_t t = front.back();
+    front.pop_back();
+    ++count;
+    for (std::uint8_t i = 0; i < 3; ++i) {
+      const std::uint32_t other = neighbours_[t][i];
+      if (other == kNone || !is_wound_alike({t, i}, other)) return false;
+      if (reached[other]) continue;
+      reached[other] = true;
+      front.push_back(other);
+    }
+  }
+  return count == mesh_.triangles.size();
+}
+
+double MeshSurface::angle_at(std::uint32_t triangle, std::uint32_t vertex) const noexcept {
+  int i = 0;
+  while (i < 2 && mesh_.triangles[triangle][static_cast<std::size_t>(i)] != vertex) ++i;
+  const Vector3d& p = corner_m(triangle, i);
+  const Vector3d to = corner_m(triangle, next(i)) - p, back = corner_m(triangle, next(next(i))) - p;
+  return std::atan2(to.cross(back).norm(), to.dot(back));
 }
 
 bool MeshSurface::is_wound_alike(std::uint32_t triangle, std::size_t side,
@@ -269,6 +303,7 @@ void MeshSurface::find_convex_vertices() {
     for (const std::uint32_t v : mesh_.triangles[t]) at[fill[v]++] = t;
 
   const std::uint32_t least_edges = kind_ == Kind::solid ? 3 : 2;
+  if (is_closed_) vertex_sides_.assign(count, 0);
   ring_begin_.assign(count + 1, 0);
   std::vector<std::uint32_t> neighbours;
   std::vector<Vector3d> directions;
@@ -277,8 +312,10 @@ void MeshSurface::find_convex_vertices() {
     if (begin[v] == begin[v + 1] || sharp_edges[v] < least_edges) continue;
     neighbours.clear();
     Vector3d mean_normal = Vector3d::Zero(), back = Vector3d::Zero();
+    Vector3d weighted_normal = Vector3d::Zero();  // weights: the angles of the faces at the vertex
     for (std::uint32_t k = begin[v]; k < begin[v + 1]; ++k) {
       mean_normal += planes_[at[k]].normal;
+      if (is_closed_) weighted_normal += angle_at(at[k], v) * planes_[at[k]].normal;
       for (const std::uint32_t corner : mesh_.triangles[at[k]])
         if (corner != v) neighbours.push_back(corner);
     }
@@ -290,7 +327,11 @@ void MeshSurface::find_convex_vertices() {
       back -= directions.back();
     }
     const Vector3d& first_guess = kind_ == Kind::solid ? mean_normal : back;
-    if (!all_fall_away(directions, first_guess.normalized())) continue;
+    const std::optional<Vector3d> above = direction_above(directions, first_guess.normalized());
+    if (!above) continue;
+    // The vertex is the point of its faces that is nearest to all points above it: METHOD, section 14.10.
+    if (is_closed_)
+      vertex_sides_[v] = static_cast<std::uint8_t>(above->dot(weighted_normal) > 0.0 ? kFront : kBack);
     const std::uint32_t owner = at[begin[v]];
     for (std::size_t i = 0; i < 3; ++i)
       if (mesh_.triangles[owner][i] == v) features_[owner].vertices[i] = v;

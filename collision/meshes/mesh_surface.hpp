@@ -56,6 +56,9 @@ class MeshSurface {
     std::array<std::uint32_t, 3> edges;
   };
   using Kind = BodyKind;
+  /// The sides of a surface, as bits. The front is the side to which the normals of the faces point. A solid
+  /// has a front only.
+  static constexpr unsigned kFront = 1, kBack = 2, kBothSides = 3;
 
   MeshSurface() = default;  ///< empty; the mesh cache fills it through visit_members()
   MeshSurface(TriangleMesh mesh, Kind kind);
@@ -82,6 +85,24 @@ class MeshSurface {
     return edge.sides[0] * planes_[edge.triangles[0]].normal +
            edge.sides[1] * planes_[edge.triangles[1]].normal;
   }
+  /// Returns the sides from which a tool can meet a convex edge first. A surface that is not closed has no
+  /// front: both sides. RT-safe.
+  unsigned sides_of(const Edge& edge) const noexcept {
+    if (!is_closed_) return kind_ == Kind::solid ? kFront : kBothSides;
+    return edge.sides[0] > 0 ? kFront : kBack;
+  }
+  /// Returns the sides from which a tool can meet a convex vertex first. Precondition: the vertex is convex.
+  /// RT-safe.
+  unsigned sides_of_vertex(std::uint32_t vertex) const noexcept {
+    if (!is_closed_) return kind_ == Kind::solid ? kFront : kBothSides;
+    return vertex_sides_[vertex];
+  }
+  /// Returns the angle of a triangle at one of its vertices [rad]. RT-safe.
+  double angle_at(std::uint32_t triangle, std::uint32_t vertex) const noexcept;
+  /// Returns true for a surface of one piece without border whose faces are wound alike. If it does not
+  /// intersect itself, it divides space: a tool of one piece that it does not intersect is on one of its
+  /// sides. RT-safe.
+  bool is_closed() const noexcept { return is_closed_; }
   /// Returns the triangle across the side from corner `side` to the next corner; kNone at a border and where
   /// more than two faces meet. RT-safe.
   std::uint32_t neighbour(std::uint32_t triangle, std::size_t side) const noexcept {
@@ -101,7 +122,8 @@ class MeshSurface {
   void visit_members(const Use& use) {
     use(mesh_.vertices_m), use(mesh_.triangles), use(kind_), use(neighbours_), use(planes_),
         use(planar_region_);
-    use(features_), use(convex_edges_), use(ring_begin_), use(ring_), use(radius_m_);
+    use(features_), use(convex_edges_), use(ring_begin_), use(ring_), use(vertex_sides_);
+    use(is_closed_), use(radius_m_);
   }
 
  private:
@@ -114,6 +136,7 @@ class MeshSurface {
   using CrowdedEdge = std::vector<TriangleSide>;
 
   std::vector<CrowdedEdge> find_neighbours();
+  bool find_closed(const std::vector<CrowdedEdge>& crowded) const;
   void find_planes();
   void find_convex_edges(const std::vector<CrowdedEdge>& crowded);
   void find_convex_vertices();
@@ -135,6 +158,8 @@ class MeshSurface {
   std::vector<Edge> convex_edges_;
   std::vector<std::uint32_t> ring_begin_;
   std::vector<std::uint32_t> ring_;
+  std::vector<std::uint8_t> vertex_sides_;  ///< sides of each convex vertex of a closed surface
+  bool is_closed_ = false;
   double radius_m_ = 0.0;
 };
 

@@ -58,12 +58,30 @@ struct Branch {
   std::uint32_t left, right;  ///< children; 0: leaf
 };
 
-std::uint16_t features_of(const MeshSurface::Features& features) {
-  const auto some = [](const std::array<std::uint32_t, 3>& list) {
-    return std::any_of(list.begin(), list.end(), [](std::uint32_t f) { return f != MeshSurface::kNone; });
+/// Returns the features that a triangle owns, as in TriangleBvh::Box.
+std::uint16_t features_of(const MeshSurface& surface, std::uint32_t triangle) {
+  unsigned features = 0;
+  const auto add = [&](unsigned kind, unsigned sides) {
+    if ((sides & MeshSurface::kFront) != 0) features |= kind;
+    if ((sides & MeshSurface::kBack) != 0) features |= kind << TriangleBvh::kBackOfBox;
   };
-  return static_cast<std::uint16_t>((some(features.vertices) ? TriangleBvh::kVertices : 0) |
-                                    (some(features.edges) ? TriangleBvh::kEdges : 0));
+  const MeshSurface::Features& owned = surface.features()[triangle];
+  for (const std::uint32_t vertex : owned.vertices)
+    if (vertex != MeshSurface::kNone) add(TriangleBvh::kVertices, surface.sides_of_vertex(vertex));
+  for (const std::uint32_t edge : owned.edges)
+    if (edge != MeshSurface::kNone) add(TriangleBvh::kEdges, surface.sides_of(surface.convex_edges()[edge]));
+  return static_cast<std::uint16_t>(features);
+}
+
+/// Adds the features of a box or a triangle to the bits of eight.
+void add_features(unsigned features, unsigned lane, std::uint32_t& has_vertices, std::uint32_t& has_edges) {
+  const auto bits = [&](unsigned kind) {
+    const unsigned front = (features & kind) != 0 ? 1U : 0U;
+    const unsigned back = (features >> TriangleBvh::kBackOfBox & kind) != 0 ? 1U : 0U;
+    return (front | back << TriangleBvh::kBackOfEight) << lane;
+  };
+  has_vertices |= bits(TriangleBvh::kVertices);
+  has_edges |= bits(TriangleBvh::kEdges);
 }
 
 /// Returns the sum of half the surface areas of the bounds of all triangles, along the rows of `axes`.
@@ -293,9 +311,8 @@ TriangleBvh::Leaf Builder::leaf(const Branch& branch) const {
     const bool used = lane < branch.end - branch.begin;
     const std::uint32_t t = order_[used ? branch.begin + lane : branch.begin];
     leaf.triangle[lane] = t;
-    const std::uint16_t features = used ? features_of(surface_.features()[t]) : std::uint16_t{0};
-    if ((features & TriangleBvh::kVertices) != 0) leaf.has_vertices |= 1U << lane;
-    if ((features & TriangleBvh::kEdges) != 0) leaf.has_edges |= 1U << lane;
+    if (used)
+      add_features(features_of(surface_, t), static_cast<unsigned>(lane), leaf.has_vertices, leaf.has_edges);
     const Vector3d& a = corner(t, 0);
     const Vector3d n = (corner(t, 1) - a).cross(corner(t, 2) - a).normalized();
     for (int d = 0; d < 3; ++d) {
@@ -319,8 +336,9 @@ TriangleBvh::Leaf Builder::leaf(const Branch& branch) const {
 
 std::uint16_t Builder::features(const Branch& branch) const {
   std::uint16_t out = 0;
-  for (std::uint32_t k = branch.begin; k < branch.end && out != 3; ++k)
-    out = static_cast<std::uint16_t>(out | features_of(surface_.features()[order_[k]]));
+  constexpr unsigned kAll = (1U << 2 * TriangleBvh::kBackOfBox) - 1;
+  for (std::uint32_t k = branch.begin; k < branch.end && out != kAll; ++k)
+    out = static_cast<std::uint16_t>(out | features_of(surface_, order_[k]));
   return out;
 }
 
@@ -350,8 +368,7 @@ TriangleBvh::Node side_by_side(const TriangleBvh::Box* boxes) {
   node.has_vertices = node.has_edges = 0;
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
     const auto& [centre, axis, half, size, child, count, features] = boxes[lane];
-    if ((features & TriangleBvh::kVertices) != 0) node.has_vertices |= 1U << lane;
-    if ((features & TriangleBvh::kEdges) != 0) node.has_edges |= 1U << lane;
+    add_features(features, static_cast<unsigned>(lane), node.has_vertices, node.has_edges);
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
       node.centre[d][lane] = centre[d];

@@ -14,8 +14,8 @@ namespace wrenchd {
 /// each leaf up to eight triangles. The traversal (pairs/bvh_traversal.hpp) tests one box against eight
 /// boxes, or one triangle against eight triangles, at a time.
 ///
-/// Boxes and triangles state whether they contain convex vertices and convex edges (mesh_surface.hpp). Two
-/// that contain none cannot meet first.
+/// Boxes and triangles state whether they contain convex vertices and convex edges (mesh_surface.hpp), and
+/// from which side of the surface these are convex. Two that contain none cannot meet first.
 ///
 /// The data are in a frame S of their own, which has the origin of the mesh's frame M and the axes of most of
 /// its triangles. There the bounds of long triangles are small, however the file is oriented.
@@ -34,16 +34,20 @@ class TriangleBvh {
     float half[3];     ///< half the length along each axis
     float half_area;   ///< half the surface area; a traversal opens the larger of two boxes first
     std::uint32_t child;
-    std::int16_t count;      ///< number of triangles in leaf `child`; 0: `child` is a node; -1: no box
-    std::uint16_t features;  ///< kVertices, kEdges: features that its triangles own
+    std::int16_t count;  ///< number of triangles in leaf `child`; 0: `child` is a node; -1: no box
+    /// kVertices, kEdges: features that its triangles own and that are convex from the front; shifted by
+    /// kBackOfBox: those that are convex from the back
+    std::uint16_t features;
   };
   static constexpr std::uint16_t kVertices = 1, kEdges = 2;
+  static constexpr unsigned kBackOfBox = 2, kBackOfEight = 8;
   /// Eight boxes as structure of arrays.
   struct alignas(64) Node {
     float centre[3][kWidth];
     float axis[3][3][kWidth];  ///< [axis][component]
     float half[3][kWidth];
-    std::uint32_t has_vertices, has_edges;  ///< one bit for each box
+    /// one bit for each box; shifted by kBackOfEight: features that are convex from the back
+    std::uint32_t has_vertices, has_edges;
   };
   /// Up to eight triangles as structure of arrays. Unused lanes hold a box that overlaps nothing.
   struct alignas(64) Leaf {
@@ -54,7 +58,8 @@ class TriangleBvh {
     float normal[3][kWidth];  ///< outward unit normal of the triangle's plane
     float offset[kWidth];     ///< normal . corner
     std::uint32_t triangle[kWidth];
-    std::uint32_t has_vertices, has_edges;  ///< one bit for each triangle
+    /// one bit for each triangle; shifted by kBackOfEight: features that are convex from the back
+    std::uint32_t has_vertices, has_edges;
   };
 
   TriangleBvh() = default;  ///< empty; the mesh cache fills it through visit_members()

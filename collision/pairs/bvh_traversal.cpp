@@ -22,7 +22,7 @@ simd::Transform displacement(const Pose& from, const Pose& to) noexcept {
 /// pose half way.
 simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, double extent_m) noexcept {
   const double radius_a_m = std::sqrt(3.0) * least_radius_a_m;
-  const auto& [start, end, reach_m, all_pairs, classify] = sweep;
+  const auto& [start, end, reach_m, all_pairs, classify, sides_b] = sweep;
   simd::RelativeMotion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -38,6 +38,7 @@ simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, doub
       simd::kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
                                              end.translation_m.lpNorm<Eigen::Infinity>()));
   motion.all_pairs = all_pairs;
+  motion.sides_b = sides_b;
   motion.half_angle = static_cast<float>(0.5 * angle);
   motion.margin = static_cast<float>(reach_m + arc_deviation_m + rounding_m);
   motion.reach = static_cast<float>(reach_m + arc_deviation_m);
@@ -72,8 +73,12 @@ BvhTraversal::BvhTraversal(simd::TraversalKernel kernel)
       moved_leaves_(simd::kMovedLeavesBytes / sizeof(CacheLine)) {}
 
 void BvhTraversal::start(const TriangleBvh& a, const TriangleBvh& b, const Sweep& sweep) noexcept {
-  const Sweep of_data = {between_data(a, b, sweep.X_BA_start), between_data(a, b, sweep.X_BA_end),
-                         sweep.reach_m, sweep.all_pairs, sweep.classify};
+  const Sweep of_data = {between_data(a, b, sweep.X_BA_start),
+                         between_data(a, b, sweep.X_BA_end),
+                         sweep.reach_m,
+                         sweep.all_pairs,
+                         sweep.classify,
+                         sweep.sides_b};
   job_ = {arrays_of(a),
           arrays_of(b),
           motion_of(of_data, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),

@@ -31,6 +31,9 @@ struct Sweep {
   /// True: classify pairs as intersecting, separate or in doubt. Precondition: a single pose, reach_m = 0,
   /// all_pairs.
   bool classify = false;
+  /// Sides of B's surface from which A can meet it (MeshSurface::kFront, kBack). Features that are convex
+  /// from the other side only are omitted, unless all_pairs.
+  unsigned sides_b = MeshSurface::kBothSides;
 };
 
 /// Work limit of traversals. The limit counts work, not time, so that a replay gives equal results.
@@ -58,6 +61,7 @@ struct RelativeMotion {
   bool moving;
   bool all_pairs;
   bool classify;
+  unsigned sides_b;
 };
 struct BvhArrays {
   const TriangleBvh::Box* boxes;

@@ -5,8 +5,10 @@
 
 namespace wrenchd {
 
-CandidatePairs::CandidatePairs(const Scene& scene)
-    : scene_(scene), culler_(BvhTraversal::kCapacity, scene.meshes().size(), scene.tool_radius_m()) {
+CandidatePairs::CandidatePairs(const Scene& scene, SurfaceSides* sides)
+    : scene_(scene),
+      sides_(sides),
+      culler_(BvhTraversal::kCapacity, scene.meshes().size(), scene.tool_radius_m()) {
   pairs_.reserve(BvhTraversal::kCapacity);
   nearby_obstacles_.reserve(scene.meshes().size());
   relative_paths_.reserve(scene.meshes().size());
@@ -34,11 +36,13 @@ void CandidatePairs::clear() noexcept {
 void CandidatePairs::start_next_obstacle() noexcept {
   appended_ = 0;
   if (next_obstacle_ == nearby_obstacles_.size()) return;
-  const MeshObstacle& obstacle = scene_.meshes()[nearby_obstacles_[next_obstacle_]];
+  const std::uint32_t number = nearby_obstacles_[next_obstacle_];
+  const MeshObstacle& obstacle = scene_.meshes()[number];
   const Pose X_OW_start = inverse(obstacle.X_WO_at(path_.start_s));
   const Pose X_OW_end = inverse(obstacle.X_WO_at(path_.end_s));
   traversal_.start(scene_.tool_mesh()->bvh, obstacle.mesh->bvh,
-                   {X_OW_start * path_.X_WT_start, X_OW_end * path_.X_WT_end, path_.reach_m, false});
+                   {X_OW_start * path_.X_WT_start, X_OW_end * path_.X_WT_end, path_.reach_m, false, false,
+                    sides_ != nullptr ? sides_->of(number) : MeshSurface::kBothSides});
 }
 
 bool CandidatePairs::will_cover(const Pose& X_WT, double time_s) const noexcept {

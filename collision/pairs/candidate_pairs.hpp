@@ -9,6 +9,7 @@
 #include "collision/pairs/bvh_traversal.hpp"
 #include "collision/pairs/pair_culler.hpp"
 #include "collision/scene.hpp"
+#include "collision/surface_sides.hpp"
 
 namespace wrenchd {
 
@@ -34,8 +35,9 @@ class CandidatePairs {
     double start_s = 0.0, end_s = 0.0;  ///< scene time at both ends [s]; used if obstacles move
   };
 
-  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
-  explicit CandidatePairs(const Scene& scene);
+  /// Keeps references to the scene and to the sides on which the tool is; both must outlive this object.
+  /// sides: null if they are not known. Not RT-safe: allocates.
+  explicit CandidatePairs(const Scene& scene, SurfaceSides* sides = nullptr);
   CandidatePairs(const CandidatePairs&) = delete;  // a copy would lose the reserved memory
   CandidatePairs& operator=(const CandidatePairs&) = delete;
 
@@ -88,6 +90,7 @@ class CandidatePairs {
   bool append_found_pairs() noexcept;
 
   const Scene& scene_;
+  SurfaceSides* sides_;
   BvhTraversal traversal_;
   State state_ = State::empty;
   Path path_;

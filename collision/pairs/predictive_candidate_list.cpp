@@ -84,9 +84,10 @@ bool continue_list(CandidatePairs& list, std::uint32_t visits, VisitBudget& budg
 
 }  // namespace
 
-PredictiveCandidateList::PredictiveCandidateList(const Scene& scene)
+PredictiveCandidateList::PredictiveCandidateList(const Scene& scene, bool tool_passes_nothing)
     : scene_(scene),
-      lists_{CandidatePairs(scene), CandidatePairs(scene), CandidatePairs(scene)},
+      sides_(scene, tool_passes_nothing),
+      lists_{CandidatePairs(scene, &sides_), CandidatePairs(scene, &sides_), CandidatePairs(scene, &sides_)},
       horizon_ticks_(kMaxHorizon_ticks) {}
 
 bool PredictiveCandidateList::ensure_covers(const Pose& X_start, const Pose& X_end, const PathTimes& times,
@@ -97,6 +98,7 @@ bool PredictiveCandidateList::ensure_covers(const Pose& X_start, const Pose& X_e
   const auto will_cover = [&](const CandidatePairs& list) {
     return list.will_cover(X_end, times.end_s) && list.will_cover(X_start, times.start_s);
   };
+  sides_.set_admissible(X_start, times.start_s);
   list_pending_ = false;
   if (covers(*current_)) return true;
   if (next_->in_progress() && will_cover(*next_) && next_list_is_cheaper(allowed_visits(budget))) {
@@ -201,6 +203,7 @@ double PredictiveCandidateList::covered_fraction_of(const CandidatePairs& list, 
 
 void PredictiveCandidateList::prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s,
                                        std::uint32_t spare_visits) noexcept {
+  sides_.set_admissible(X_WT, time_s);
   if (std::exchange(deferred_tick_, false))
     predictor_.observe_deferred(X_WP);
   else
@@ -268,6 +271,7 @@ std::uint32_t PredictiveCandidateList::visits_this_tick(const Pose& X_service,
 
 void PredictiveCandidateList::reset() noexcept {
   predictor_.reset();
+  sides_.forget();
   for (CandidatePairs& list : lists_) list.clear();
   mispredicted_ = list_pending_ = deferred_tick_ = false;
   prefetch_cost_visits_ = immediate_cost_visits_ = 0;

@@ -22,8 +22,11 @@ class PredictiveCandidateList {
   /// Number of pairs that the culler tests in the time of one node visit.
   static constexpr std::size_t kPairsPerVisit = 32;
 
-  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
-  explicit PredictiveCandidateList(const Scene& scene);
+  /// Keeps a reference to the scene, which must outlive this object. tool_passes_nothing: the starts of all
+  /// paths are admissible, and the tool goes from one to the next without passing through a surface, unless
+  /// reset() or tool_was_placed() is called in between. False: a path may start anywhere. Not RT-safe:
+  /// allocates.
+  explicit PredictiveCandidateList(const Scene& scene, bool tool_passes_nothing = false);
   PredictiveCandidateList(const PredictiveCandidateList&) = delete;  // a copy would lose the reserved memory
   PredictiveCandidateList& operator=(const PredictiveCandidateList&) = delete;
 
@@ -58,6 +61,16 @@ class PredictiveCandidateList {
   /// Discards all lists and predictions, for example after the tool was placed elsewhere. RT-safe.
   void reset() noexcept;
 
+  /// Discards lists that depend on the side of a surface on which the tool is (surface_sides.hpp): it is at
+  /// an admissible pose now that it did not reach by a path on which it met nothing. RT-safe.
+  void tool_was_placed() noexcept {
+    if (sides_.any_known()) reset();
+  }
+
+  /// Returns the sides from which the tool can meet an obstacle of current(). number: index in
+  /// scene.meshes(). RT-safe.
+  unsigned sides_of(std::uint32_t number) noexcept { return sides_.of(number); }
+
   const CandidatePairs& current() const noexcept { return *current_; }
   PairCuller& culler() noexcept { return current_->culler(); }  ///< culler of current()
   /// number of lists built immediately so far
@@ -84,6 +97,7 @@ class PredictiveCandidateList {
   void make_current(CandidatePairs*& list) noexcept;
 
   const Scene& scene_;
+  SurfaceSides sides_;
   std::array<CandidatePairs, 3> lists_;
   CandidatePairs* current_ = &lists_[0];  ///< in use
   CandidatePairs* next_ = &lists_[1];     ///< under construction, or waiting for its use

@@ -110,9 +110,12 @@ TriangleMesh shell_of(const Cage& cage) {
   return shell;
 }
 
-Bodies bodies_of(const Cage& cage, const ObstacleMotion& motion) {
+/// divides_space: MeshBvh::divides_space.
+Bodies bodies_of(const Cage& cage, bool divides_space, const ObstacleMotion& motion) {
+  MeshBvh shell(shell_of(cage), BodyKind::surface);
+  shell.divides_space = divides_space;
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"shell", MeshBvh(shell_of(cage), BodyKind::surface), Pose{}, motion});
+  obstacles.push_back({"shell", std::move(shell), Pose{}, motion});
   Scene scene(mesh_tool(make_mesh(cage.tool)), {}, {}, std::move(obstacles));
   TriangleMesh tool = scene.tool_mesh()->surface.mesh();
   return {std::move(scene), std::move(tool), shell_of(cage), {}, {}};
@@ -280,6 +283,9 @@ int main(int argc, char** argv) {
   app.add_flag("--moving", moving, "the obstacles move too, at random");
   bool surfaces = false;
   app.add_flag("--surface", surfaces, "the obstacles of the twenty scenes are surfaces");
+  bool two_sided = false;
+  app.add_flag("--two-sided", two_sided,
+               "the tool can meet surfaces from both sides, as if they were not known to divide space");
   CLI11_PARSE(app, argc, argv);
 
   std::printf("%-42s %9s %8s %5s %9s %9s %6s %7s %7s %6s %8s %8s %8s %8s\n", "scene", "poses", "overlaps",
@@ -295,6 +301,7 @@ int main(int argc, char** argv) {
   std::vector<Task> tasks;
   for (ManipulationCase handling : manipulation_cases()) {
     handling.obstacle_kind = surfaces ? BodyKind::surface : BodyKind::solid;
+    handling.divides_space = surfaces && !two_sided;
     tasks.push_back({handling.name, [=](const ObstacleMotion& motion) {
                        return handle(handling.start_m, HandTrajectory(handling, seed),
                                      bodies_of(handling, motion), poses, descents, motion,
@@ -314,8 +321,8 @@ int main(int argc, char** argv) {
   for (const Cage& cage : cages())
     tasks.push_back({cage.name, [&](const ObstacleMotion& motion) {
                        const TriangleMesh shell = shell_of(cage);
-                       return handle(Vector3d::Zero(), CagedHand(seed), bodies_of(cage, motion), poses,
-                                     descents, motion,
+                       return handle(Vector3d::Zero(), CagedHand(seed), bodies_of(cage, !two_sided, motion),
+                                     poses, descents, motion,
                                      [&](const Pose&, const Pose& after) { return escaped(shell, after); });
                      }});
   const auto work = [&] {

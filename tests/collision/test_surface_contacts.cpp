@@ -136,6 +136,61 @@ std::vector<SolidCase> solid_cases() {
   };
 }
 
+TEST_CASE("for a closed surface that is known to divide space a proxy lists the pairs of the solid",
+          "[surface_contacts]") {
+  const ManipulationCase handling = {"cube in a noisy tray", {}, {}, Handling::slide, {0, 0, 0.005}};
+  const TriangleMesh tool = make_mesh({"cube", 2000});
+  const TriangleMesh noisy_tray = with_noise(split_at_random(tray(), 2000, 4), 2e-4, 5);
+  const auto listed_pairs = [&](BodyKind kind, bool divides_space) {
+    MeshBvh mesh(noisy_tray, kind);
+    mesh.divides_space = divides_space;
+    std::vector<MeshObstacle> obstacles;
+    obstacles.push_back({"obstacle", std::move(mesh), Pose{}});
+    const Scene scene(mesh_tool(tool), {}, {}, std::move(obstacles));
+    Proxy proxy(scene);
+    HandTrajectory hand(handling);
+    Pose X_WT = {Quaterniond::Identity(), handling.start_m};
+    std::uint64_t sum = 0;
+    for (int tick = 0; tick < 600; ++tick) {
+      X_WT = proxy.follow(hand.next(), X_WT).X_WQ;
+      sum += proxy.candidate_count();
+    }
+    return sum;
+  };
+  const std::uint64_t solid = listed_pairs(BodyKind::solid, false);
+  CHECK(solid > 0);
+  CHECK(listed_pairs(BodyKind::surface, true) <= solid);
+  CHECK(listed_pairs(BodyKind::surface, false) > solid + solid / 5);
+}
+
+TEST_CASE("a tool that is placed on the other side of a closed surface is held there", "[surface_contacts]") {
+  // A room of 1 m and a tool of 0.1 m. The hand pulls through the wall at x = 0.5 m from both sides.
+  const auto scaled = [](TriangleMesh mesh, double size_m) {
+    const double factor = size_m / (mesh.vertices_m[0] - mesh.vertices_m[1]).cwiseAbs().maxCoeff();
+    for (Vector3d& p : mesh.vertices_m) p *= factor;
+    return mesh;
+  };
+  MeshBvh room(scaled(make_mesh({"cube", 12}), 1.0), BodyKind::surface);
+  room.divides_space = room.surface.is_closed();
+  std::vector<MeshObstacle> obstacles;
+  obstacles.push_back({"room", std::move(room), Pose{}});
+  const Scene scene(mesh_tool(scaled(make_mesh({"cube", 12}), 0.1)), {}, {}, std::move(obstacles));
+  const auto at_x = [](double x_m) { return Pose{Quaterniond::Identity(), {x_m, 0.02, 0.01}}; };
+  for (const bool is_told : {true, false}) {
+    Proxy proxy(scene);
+    const auto pull = [&](double from_m, double to_m) {
+      if (is_told) proxy.clear_history();
+      Pose X_WT = at_x(from_m);
+      for (int tick = 0; tick < 400; ++tick)
+        X_WT = proxy.follow(at_x(from_m + (to_m - from_m) * std::min(1.0, 0.005 * tick)), X_WT).X_WQ;
+      return X_WT.translation_m.x();
+    };
+    CHECK(pull(0.8, 0.0) == Approx(0.55).margin(1e-6));
+    CHECK(pull(0.0, 0.8) == Approx(0.45).margin(1e-6));
+    CHECK(pull(0.8, 0.0) == Approx(0.55).margin(1e-6));
+  }
+}
+
 TEST_CASE("a closed mesh as a surface holds a tool as the solid does", "[surface_contacts]") {
   for (const SolidCase& c : solid_cases()) {
     Difference d = compare(against(c.tool, c.obstacle, BodyKind::solid),

@@ -43,9 +43,10 @@ ToolBody mesh_tool(TriangleMesh mesh, double mass_kg) {
 }
 
 Scene scene_of(const ManipulationCase& handling, const ObstacleMotion& motion) {
+  MeshBvh obstacle(make_mesh(handling.obstacle), handling.obstacle_kind);
+  obstacle.divides_space = handling.divides_space;
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({handling.obstacle.kind, MeshBvh(make_mesh(handling.obstacle), handling.obstacle_kind),
-                       Pose{}, motion});
+  obstacles.push_back({handling.obstacle.kind, std::move(obstacle), Pose{}, motion});
   return Scene(mesh_tool(make_mesh(handling.tool)), {}, {}, std::move(obstacles));
 }
 

@@ -26,6 +26,7 @@ struct ManipulationCase {
   Handling motion;
   Vector3d start_m;  ///< start position of the tool, without overlap
   BodyKind obstacle_kind = BodyKind::solid;
+  bool divides_space = false;  ///< for a surface: MeshBvh::divides_space
 };
 
 /// Twenty cases: thin and thick, flat and round, fine and coarse, loose and tight.

@@ -90,6 +90,8 @@ void check_same(const MeshBvh& a, const MeshBvh& b) {
   CHECK(bytes_of(a.surface.features()) == bytes_of(b.surface.features()));
   CHECK(bytes_of(a.surface.convex_edges()) == bytes_of(b.surface.convex_edges()));
   CHECK(a.surface.radius_m() == b.surface.radius_m());
+  CHECK(a.surface.is_closed() == b.surface.is_closed());
+  CHECK(a.divides_space == b.divides_space);
   for (std::uint32_t v = 0; v < a.surface.vertices_m().size(); v += 97) {
     const auto x = a.surface.ring_of(v), y = b.surface.ring_of(v);
     CHECK(std::equal(x.begin(), x.end(), y.begin(), y.end()));
@@ -218,6 +220,25 @@ TEST_CASE("contacts use a simplified solid, and the loader says so", "[mesh_load
     CHECK(bvh->loaded_triangle(7) == 7);
     CHECK(said.empty());
   }
+}
+
+TEST_CASE("a surface divides space if it is closed and does not intersect itself", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const auto divides_space = [&](const TriangleMesh& mesh, BodyKind kind) {
+    MeshLoader loader;
+    const fs::path file = dir.write("mesh.off", off_of(mesh));
+    return loader.build_bvh(mesh, kind, file, 1e-6)->divides_space;
+  };
+  const TriangleMesh ball = make_mesh({"sphere", 300});
+  CHECK(divides_space(ball, BodyKind::surface));
+  CHECK_FALSE(divides_space(ball, BodyKind::solid));  // a solid has one side anyway
+  TriangleMesh open = ball;
+  open.triangles.pop_back();
+  CHECK_FALSE(divides_space(open, BodyKind::surface));
+  TriangleMesh pierced = ball;
+  pierced.vertices_m[0] *= -1.5;  // through the opposite side
+  CHECK(MeshSurface(pierced, BodyKind::surface).is_closed());
+  CHECK_FALSE(divides_space(pierced, BodyKind::surface));
 }
 
 TEST_CASE("a small mesh is neither reported nor cached", "[mesh_loader]") {

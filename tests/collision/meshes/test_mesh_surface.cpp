@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <set>
@@ -258,4 +259,57 @@ TEST_CASE("the border of an open mesh counts as an edge with one face", "[mesh_s
 }
 
 }  // namespace
+TEST_CASE("from each side a closed surface has the features of the solid on that side, and no others",
+          "[mesh_surface]") {
+  for (const TriangleMesh& mesh : {angle_iron(), make_mesh({"boulder", 2000}), make_mesh({"gear", 2000})}) {
+    TriangleMesh inside_out = mesh;
+    for (auto& corners : inside_out.triangles) std::swap(corners[1], corners[2]);
+    const MeshSurface surface(mesh, Kind::surface);
+    REQUIRE(surface.is_closed());
+    using Features = std::set<std::array<std::uint32_t, 2>>;
+    const auto features_from = [](const MeshSurface& body, unsigned side) {
+      Features out;
+      for (const MeshSurface::Features& features : body.features()) {
+        for (const std::uint32_t v : features.vertices)
+          if (v != MeshSurface::kNone && (body.sides_of_vertex(v) & side) != 0) out.insert({v, v});
+        for (const std::uint32_t e : features.edges) {
+          if (e == MeshSurface::kNone || (body.sides_of(body.convex_edges()[e]) & side) == 0) continue;
+          auto ends = body.convex_edges()[e].vertices;
+          std::sort(ends.begin(), ends.end());
+          out.insert(ends);
+        }
+      }
+      return out;
+    };
+    const Features front = features_from(MeshSurface(mesh, Kind::solid), MeshSurface::kFront);
+    const Features back = features_from(MeshSurface(inside_out, Kind::solid), MeshSurface::kFront);
+    const auto missing = [](const Features& some, const Features& from) {
+      Features out;
+      std::set_difference(from.begin(), from.end(), some.begin(), some.end(), std::inserter(out, out.end()));
+      return out;
+    };
+    const auto check = [&](unsigned side, const Features& of_solid) {
+      const Features of_surface = features_from(surface, side);
+      CHECK(missing(of_solid, of_surface) == Features());
+      // A solid also keeps tips of pits from which three convex edges rise. No body can touch them.
+      for (const auto& [v, w] : missing(of_surface, of_solid)) {
+        CHECK(v == w);
+        CHECK(surface.sides_of_vertex(v) == MeshSurface::kBothSides - side);
+      }
+    };
+    check(MeshSurface::kFront, front);
+    check(MeshSurface::kBack, back);
+    CHECK(!front.empty());
+    CHECK(!back.empty());
+    // A surface that is not closed has no front: every feature counts from both sides.
+    TriangleMesh open = mesh;
+    open.triangles.pop_back();
+    const MeshSurface sheet(open, Kind::surface);
+    CHECK(missing(features_from(sheet, MeshSurface::kFront), features_from(sheet, MeshSurface::kBack)) ==
+          Features());
+    CHECK(missing(features_from(sheet, MeshSurface::kBack), features_from(sheet, MeshSurface::kFront)) ==
+          Features());
+  }
+}
+
 }  // namespace wrenchd::test_mesh_surface

@@ -155,4 +155,41 @@ TEST_CASE("a traversal stops at the end of its budget and reports it", "[bvh_tra
 }
 
 }  // namespace
+TEST_CASE("from the front of a closed surface the pairs of the solid are listed, on every processor",
+          "[bvh_traversal]") {
+  RandomValues random(27);
+  BvhTraversal fastest, portable(simd::traverse_portable);
+  const MeshBvh tool(make_mesh({"bumpy", 2000}));
+  const TriangleMesh mesh = make_mesh({"boulder", 3000});
+  const MeshBvh solid(mesh, BodyKind::solid), surface(mesh, BodyKind::surface);
+  REQUIRE(surface.surface.is_closed());
+  const auto listed = [&](BvhTraversal& traversal, const MeshBvh& b, const Pose& X_BA, unsigned sides) {
+    VisitBudget budget = {1000000000};
+    Sweep sweep = {X_BA, X_BA, 0.002, false};
+    sweep.sides_b = sides;
+    REQUIRE(traversal.find(tool.bvh, b.bvh, sweep, budget));
+    PairSet out;
+    for (const TrianglePair& pair : traversal) out.insert({pair.a, pair.b});
+    return out;
+  };
+  std::size_t more_pairs = 0, from_back = 0;
+  for (int n = 0; n < 20; ++n) {
+    const Pose X_BA = near_pose(random, tool, solid);
+    for (BvhTraversal* traversal : {&fastest, &portable}) {
+      const auto of_solid = listed(*traversal, solid, X_BA, MeshSurface::kBothSides);
+      const auto front = listed(*traversal, surface, X_BA, MeshSurface::kFront);
+      for (const auto& pair : front) CHECK(of_solid.count(pair) == 1);
+      // A solid keeps a few tips of pits, which no body can touch.
+      CHECK(front.size() >= of_solid.size() - of_solid.size() / 50);
+      const auto both = listed(*traversal, surface, X_BA, MeshSurface::kBothSides);
+      more_pairs += both.size() - of_solid.size();
+      const auto back = listed(*traversal, surface, X_BA, MeshSurface::kBack);
+      from_back += back.size();
+      for (const auto& pair : back) CHECK(both.count(pair) == 1);
+    }
+  }
+  CHECK(more_pairs > 0);
+  CHECK(from_back > 0);
+}
+
 }  // namespace wrenchd::test_bvh_traversal
