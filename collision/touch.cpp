@@ -46,7 +46,7 @@ Vector3d point_W(const Contact& contact, FeatureKind tool, FeatureKind obstacle,
   return contact_point_W(contact, X_WQ);
 }
 
-std::array<double, 3> numbers(const Vector3d& v) noexcept {
+std::array<double, 3> coordinates(const Vector3d& v) noexcept {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -130,8 +130,8 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
     const Feature tool = tool_feature(contact, scene, of_meshes);
     const Feature obstacle = obstacle_feature(contact, scene, of_meshes);
     Touch touch;
-    touch.point_W_m = numbers(point_W(contact, tool.kind, obstacle.kind, projection.X_WQ));
-    touch.normal_W = numbers(normal_W(contact, projection.X_WQ));
+    touch.point_W_m = coordinates(point_W(contact, tool.kind, obstacle.kind, projection.X_WQ));
+    touch.normal_W = coordinates(normal_W(contact, projection.X_WQ));
     touch.multiplier_kg_m = multiplier;
     touch.load_fraction = sum > 0.0 ? multiplier / sum : 0.0;
     touch.obstacle = contact.obstacle;

@@ -36,7 +36,7 @@ bool read_file_name(const TomlValue& value, const Context& context, fs::path& na
   return (value.path(name) || !value) && find_file(value, context, name);
 }
 
-bool read_profile(const TomlValue& value, const Context& context, DeviceSettings& device) {
+bool read_profile_setting(const TomlValue& value, const Context& context, DeviceSettings& device) {
   const bool good = value.text(device.profile);
   device.profile_file.clear();
   if (device.profile == kAnyProfile) return good;
@@ -44,7 +44,7 @@ bool read_profile(const TomlValue& value, const Context& context, DeviceSettings
   return find_file(value, context, device.profile_file) && good;
 }
 
-bool read_pose(const TomlValue& value, PoseSettings& pose) {
+bool read_pose_setting(const TomlValue& value, PoseSettings& pose) {
   value.table([&pose](TomlTable& table) {
     table.optional("position_m").vector(pose.position_m, {-10, 10});
     table.optional("rotation_vector_rad").vector(pose.rotation_vector_rad, {-10, 10});
@@ -187,12 +187,12 @@ bool equal(const std::vector<TimedPose>& a, const std::vector<TimedPose>& b) {
 constexpr std::array kTable = {
     WRENCHD_SETTING("", "description", "", none, description, value.paragraphs(out)),
     WRENCHD_SETTING("", "scene", "", scene, scene, read_file_name(value, context, out)),
-    WRENCHD_SETTING("device", "profile", "", restart, device.profile, read_profile(value, context, settings.device)),
+    WRENCHD_SETTING("device", "profile", "", restart, device.profile, read_profile_setting(value, context, settings.device)),
     WRENCHD_SETTING("device", "serial", "", restart, device.serial, value.text(out)),
     WRENCHD_SETTING("device", "usb_port", "", restart, device.usb_port, value.text(out)),
     WRENCHD_SETTING("device", "first_test", "", restart, device.first_test, value.boolean(out)),
-    WRENCHD_SETTING("device", "base_in_world", "", restart, device.base_in_world, read_pose(value, out)),
-    WRENCHD_SETTING("device", "tool_in_handle", "", new_rendering, device.tool_in_handle, read_pose(value, out)),
+    WRENCHD_SETTING("device", "base_in_world", "", restart, device.base_in_world, read_pose_setting(value, out)),
+    WRENCHD_SETTING("device", "tool_in_handle", "", new_rendering, device.tool_in_handle, read_pose_setting(value, out)),
     WRENCHD_NUMBER("servo", "rate_Hz", restart, servo.rate_Hz, 500, 8000),
     WRENCHD_SETTING("servo", "pacing", "", restart, servo.pacing,
                     value.choice(out, {{"clock", Pacing::clock}, {"device", Pacing::device}})),

@@ -22,7 +22,7 @@ double capped_ratio(double limit, double b) noexcept {
   return b > 0.0 ? std::min(1.0, limit / b) : 0.0;
 }
 
-[[noreturn]] void reject(const char* what) {
+[[noreturn]] void reject_caps(const char* what) {
   throw std::invalid_argument(std::string("passivity guard: ") + what);
 }
 
@@ -32,11 +32,11 @@ PassivityGuard::PassivityGuard(const DeviceDamping& device, const PassivityLimit
     : device_{stated_or_zero(device.linear_N_s_per_m), stated_or_zero(device.angular_Nm_s_per_rad)},
       limits_(caps) {
   if (!is_valid(caps.damping_N_s_per_m) || !is_valid(caps.damping_Nm_s_per_rad))
-    reject("the caps on damping must be 0 or more");
+    reject_caps("the caps on damping must be 0 or more");
   if (!is_valid(caps.scaling_start_J) || !is_valid(caps.scaling_end_J) ||
       caps.scaling_start_J >= caps.scaling_end_J)
-    reject("unseen_J must be 0 or more and below most_J");
-  if (caps.delay_ticks > kMaxDelay_ticks) reject("the delay is too long for a hand; shorten it");
+    reject_caps("unseen_J must be 0 or more and below most_J");
+  if (caps.delay_ticks > kMaxDelay_ticks) reject_caps("the delay is too long for a hand; shorten it");
   const double linear = capped_ratio(caps.damping_N_s_per_m, device_.linear_N_s_per_m);
   const double angular = capped_ratio(caps.damping_Nm_s_per_rad, device_.angular_Nm_s_per_rad);
   max_alpha_ = device_.angular_Nm_s_per_rad > 0.0 && device_.linear_N_s_per_m > 0.0

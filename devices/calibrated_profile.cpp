@@ -17,7 +17,7 @@ std::string joint_name(std::size_t joint) {
   return "joint_" + std::to_string(joint + 1);
 }
 
-[[noreturn]] void reject(const DeviceProfile& profile, const std::string& axis) {
+[[noreturn]] void reject_axis(const DeviceProfile& profile, const std::string& axis) {
   throw std::invalid_argument("the calibration names the axis " + axis + ", which the profile " +
                               profile.name + " does not have; calibrate again");
 }
@@ -29,7 +29,7 @@ void shift_joint(DeviceProfile& profile, const AxisOffset& offset) {
     k.zero_rad[i] -= offset.offset;
     return;
   }
-  reject(profile, offset.axis);
+  reject_axis(profile, offset.axis);
 }
 
 JointAngles angles_in_rest(const DeviceProfile& profile) {
@@ -53,7 +53,7 @@ DeviceProfile apply_calibration(DeviceProfile profile, const std::vector<AxisOff
   const auto offset = pose_offset(offsets);
   if (!offset) {
     for (const AxisOffset& one : offsets)
-      if (!pose_offset({one})) reject(profile, one.axis);
+      if (!pose_offset({one})) reject_axis(profile, one.axis);
   }
   profile.X_BD.translation_m -= offset->position_m;
   profile.X_EH.rotation = (profile.X_EH.rotation * rotation_from(-offset->rotation_rad)).normalized();

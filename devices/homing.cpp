@@ -40,7 +40,7 @@ void require(bool holds, const char* what) {
   if (!holds) throw std::invalid_argument(std::string("homing plan: ") + what);
 }
 
-void check(const HomingPlan& plan) {
+void check_plan(const HomingPlan& plan) {
   require(std::any_of(plan.sensed.begin(), plan.sensed.end(), [](bool s) { return s; }),
           "no axis is sensed, so there is nothing to home");
   require(plan.travel_m > 0.0 && plan.travel_m <= 0.5, "travel_m must be above 0 and 0.5 at most");
@@ -149,7 +149,7 @@ std::string operator_instruction(const HomingState& state) {
 }
 
 Homing::Homing(const HomingPlan& plan) : plan_(plan) {
-  check(plan);
+  check_plan(plan);
   restart();
 }
 

@@ -46,18 +46,18 @@ std::string shape_text(std::size_t bits, bool is_signed, std::size_t begin) {
          (bits == 1 ? "at " : "from ") + place_text(begin);
 }
 
-std::string text(const Cell& cell) {
+std::string cells_text(const Cell& cell) {
   const std::string shape = shape_text(cell.field->bits, cell.field->is_signed(), cell.begin());
   if (cell.field->constant) return "padding, from " + place_text(cell.begin());
   const auto usage = cell.field->usage(cell.index);
   return (usage ? to_text(*usage) + ", " : "") + shape;
 }
 
-std::string text(const std::vector<Cell>& cells) {
+std::string cells_text(const std::vector<Cell>& cells) {
   constexpr std::size_t kMaxListed = 3;
   std::string all;
   for (std::size_t i = 0; i < std::min(cells.size(), kMaxListed); ++i)
-    all += (i > 0 ? "; " : "") + text(cells[i]);
+    all += (i > 0 ? "; " : "") + cells_text(cells[i]);
   return all + (cells.size() > kMaxListed ? "; and more" : "");
 }
 
@@ -119,7 +119,8 @@ std::optional<std::string> difference(const DescribedReport& device, const Expec
       return report_name + "the device's report ends with byte " + std::to_string(device.length - 1);
     const std::vector<Cell> cells = cells_within(device, begin, end);
     if (cells.empty()) return report_name + "the device declares nothing there";
-    if (!agrees(cells, begin, end, field.is_signed)) return report_name + "the device has " + text(cells);
+    if (!agrees(cells, begin, end, field.is_signed))
+      return report_name + "the device has " + cells_text(cells);
     if (const auto range = range_difference(*cells.front().field, field)) return field.name + ": " + *range;
   }
   return {};

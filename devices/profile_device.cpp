@@ -54,12 +54,13 @@ Vector3d clamp_norm(const Vector3d& v, double max_norm, double step) noexcept {
   return length <= limit ? v : Vector3d(v * (limit / length));
 }
 
-[[noreturn]] void reject(const DeviceProfile& profile, const std::string& why) {
+[[noreturn]] void reject_profile(const DeviceProfile& profile, const std::string& why) {
   throw std::runtime_error("device profile " + profile.name + ": " + why);
 }
 
 void check_number(const DeviceProfile& profile, const char* key, double value) {
-  if (!is_finite(value) || value <= 0.0) reject(profile, std::string(key) + " must be stated and above 0");
+  if (!is_finite(value) || value <= 0.0)
+    reject_profile(profile, std::string(key) + " must be stated and above 0");
 }
 
 void check_profile(const DeviceProfile& profile) {
@@ -74,7 +75,7 @@ void check_profile(const DeviceProfile& profile) {
   try {
     validate_reports(profile);
   } catch (const std::invalid_argument& e) {
-    reject(profile, e.what());
+    reject_profile(profile, e.what());
   }
 }
 

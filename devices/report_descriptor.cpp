@@ -57,7 +57,7 @@ std::string hex_digits(std::uint64_t value, int digits = 2) {
   return text.data();
 }
 
-[[noreturn]] void reject(const Item& item, const std::string& why) {
+[[noreturn]] void reject_item(const Item& item, const std::string& why) {
   throw DescriptorError(item.at, why);
 }
 
@@ -124,11 +124,11 @@ class DescriptorParser {
     const std::uint8_t prefix = bytes_[next_];
     const unsigned bits = prefix;
     Item item{next_, static_cast<ItemType>(bits >> 2 & 3), bits >> 4, kSizes[bits & 3], 0};
-    if (prefix == kLongItem) reject(item, "is a long item; none is defined, and Linux accepts none");
+    if (prefix == kLongItem) reject_item(item, "is a long item; none is defined, and Linux accepts none");
     if (bytes_.size() - next_ - 1 < item.size)
-      reject(item, "item 0x" + hex_digits(prefix) + " needs " + std::to_string(item.size) +
-                       " more bytes, and the descriptor ends after " +
-                       std::to_string(bytes_.size() - next_ - 1));
+      reject_item(item, "item 0x" + hex_digits(prefix) + " needs " + std::to_string(item.size) +
+                            " more bytes, and the descriptor ends after " +
+                            std::to_string(bytes_.size() - next_ - 1));
     for (unsigned i = 0; i < item.size; ++i)
       item.data |= static_cast<std::uint32_t>(bytes_[next_ + 1 + i]) << 8 * i;
     next_ += 1 + item.size;
@@ -144,22 +144,22 @@ class DescriptorParser {
   /// Checks that everything that was opened is closed.
   void close() const {
     const Item end{bytes_.size(), ItemType::main, 0, 0, 0};
-    if (local_.delimited) reject(end, "a delimiter is still open; close it");
+    if (local_.delimited) reject_item(end, "a delimiter is still open; close it");
     if (!open_.empty())
-      reject(end, std::to_string(open_.size()) + " collection(s) are still open; end them (c0)");
+      reject_item(end, std::to_string(open_.size()) + " collection(s) are still open; end them (c0)");
     if (!pushed_.empty())
-      reject(end, std::to_string(pushed_.size()) + " push(es) without a pop; add pops (b4)");
-    if (found_.reports.empty()) reject(end, "it declares no report");
+      reject_item(end, std::to_string(pushed_.size()) + " push(es) without a pop; add pops (b4)");
+    if (found_.reports.empty()) reject_item(end, "it declares no report");
   }
 
   // Main items
 
   void main_item(const Item& item) {
-    if (local_.delimited) reject(item, "is between delimiters, where only usages are allowed");
+    if (local_.delimited) reject_item(item, "is between delimiters, where only usages are allowed");
     if (local_.usage_minimum || local_.usage_maximum) {
       const Item& half = local_.usage_minimum ? *local_.usage_minimum : *local_.usage_maximum;
-      reject(half, std::string("a usage ") + (local_.usage_minimum ? "minimum without its maximum"
-                                                                   : "maximum without its minimum"));
+      reject_item(half, std::string("a usage ") + (local_.usage_minimum ? "minimum without its maximum"
+                                                                        : "maximum without its minimum"));
     }
     if (item.tag == kInput) declare(item, ReportKind::input);
     if (item.tag == kOutput) declare(item, ReportKind::output);
@@ -171,7 +171,7 @@ class DescriptorParser {
 
   void open_collection(const Item& item) {
     if (open_.size() >= kMaxCollectionDepth)
-      reject(item, "collections are nested more than " + std::to_string(kMaxCollectionDepth) + " deep");
+      reject_item(item, "collections are nested more than " + std::to_string(kMaxCollectionDepth) + " deep");
     const Usage usage = local_.usages.empty() ? Usage{} : local_.usages.front().first.on(global_.usage_page);
     found_.collections.push_back({static_cast<std::uint8_t>(item.data), usage,
                                   open_.empty() ? DescribedCollection::kOutermost : open_.back()});
@@ -179,12 +179,12 @@ class DescriptorParser {
   }
 
   void end_collection(const Item& item) {
-    if (open_.empty()) reject(item, "ends a collection, but none is open");
+    if (open_.empty()) reject_item(item, "ends a collection, but none is open");
     open_.pop_back();
   }
 
   void declare(const Item& item, ReportKind kind) {
-    if (open_.empty()) reject(item, "declares a field outside every collection");
+    if (open_.empty()) reject_item(item, "declares a field outside every collection");
     DescribedField field;
     field.bits = global_.report_size;
     field.count = global_.report_count;
@@ -194,8 +194,8 @@ class DescriptorParser {
     field.bit = bits_used_[index];
     require_room(item, field);
     if (report.fields.size() >= kMaxFieldsPerReport)
-      reject(item, "is field " + std::to_string(kMaxFieldsPerReport + 1) + " of its report; " +
-                       std::to_string(kMaxFieldsPerReport) + " is the maximum of Linux");
+      reject_item(item, "is field " + std::to_string(kMaxFieldsPerReport + 1) + " of its report; " +
+                            std::to_string(kMaxFieldsPerReport) + " is the maximum of Linux");
     field.constant = (item.data & kConstantBit) != 0;
     field.variable = (item.data & kVariableBit) != 0;
     field.relative = (item.data & kRelativeBit) != 0;
@@ -211,7 +211,8 @@ class DescriptorParser {
   /// Returns the index of the report of the field; adds the report if it is new.
   std::size_t report_of(const Item& item, ReportKind kind) {
     if (!found_.reports.empty() && found_.has_ids() != global_.report_id.has_value())
-      reject(item, "declares a field without a report id, but other fields have one; give all fields an id");
+      reject_item(item,
+                  "declares a field without a report id, but other fields have one; give all fields an id");
     if (const DescribedReport* existing = found_.find(kind, global_.report_id))
       return static_cast<std::size_t>(existing - found_.reports.data());
     const std::size_t id_bytes = global_.report_id ? 1 : 0;
@@ -224,9 +225,9 @@ class DescriptorParser {
   static void require_room(const Item& item, const DescribedField& field) {
     const std::size_t most = 8 * kMaxDescribedReportBytes;
     if (field.count <= most && field.bit + field.bits * field.count <= most) return;
-    reject(item, std::to_string(field.count) + " fields of " + std::to_string(field.bits) +
-                     " bits make the report longer than " + std::to_string(kMaxDescribedReportBytes) +
-                     " bytes, the maximum of Linux");
+    reject_item(item, std::to_string(field.count) + " fields of " + std::to_string(field.bits) +
+                          " bits make the report longer than " + std::to_string(kMaxDescribedReportBytes) +
+                          " bytes, the maximum of Linux");
   }
 
   void set_ranges(const Item& item, DescribedField& field) const {
@@ -236,8 +237,9 @@ class DescriptorParser {
     std::tie(field.logical_min, field.logical_max) = range(global_.logical_min, global_.logical_max);
     std::tie(field.physical_min, field.physical_max) = range(global_.physical_min, global_.physical_max);
     if (field.logical_min > field.logical_max)
-      reject(item, "the logical range " + std::to_string(field.logical_min) + " to " +
-                       std::to_string(field.logical_max) + " is empty; minimum and maximum may be exchanged");
+      reject_item(item, "the logical range " + std::to_string(field.logical_min) + " to " +
+                            std::to_string(field.logical_max) +
+                            " is empty; minimum and maximum may be exchanged");
     field.unit = global_.unit;
     field.unit_exponent = global_.unit_exponent;
   }
@@ -259,7 +261,7 @@ class DescriptorParser {
     switch (item.tag) {
       case kUsagePage:
         if (item.data > 0xFFFF)
-          reject(item, "usage page 0x" + hex_digits(item.data) + " has more than 16 bits");
+          reject_item(item, "usage page 0x" + hex_digits(item.data) + " has more than 16 bits");
         global_.usage_page = static_cast<std::uint16_t>(item.data);
         return;
       case kLogicalMinimum:
@@ -281,8 +283,8 @@ class DescriptorParser {
         return;
       case kReportSize:
         if (item.data > kMaxFieldBits)
-          reject(item, "fields of " + std::to_string(item.data) + " bits; " + std::to_string(kMaxFieldBits) +
-                           " is the maximum of Linux");
+          reject_item(item, "fields of " + std::to_string(item.data) + " bits; " +
+                                std::to_string(kMaxFieldBits) + " is the maximum of Linux");
         global_.report_size = item.data;
         return;
       case kReportId:
@@ -292,16 +294,16 @@ class DescriptorParser {
         return;
       case kPush:
         if (pushed_.size() >= kMaxPushDepth)
-          reject(item, "pushes are nested more than " + std::to_string(kMaxPushDepth) + " deep");
+          reject_item(item, "pushes are nested more than " + std::to_string(kMaxPushDepth) + " deep");
         pushed_.push_back(global_);
         return;
       case kPop:
-        if (pushed_.empty()) reject(item, "is a pop without a push");
+        if (pushed_.empty()) reject_item(item, "is a pop without a push");
         global_ = pushed_.back();
         pushed_.pop_back();
         return;
       default:
-        reject(item, "global item with the reserved tag " + std::to_string(item.tag));
+        reject_item(item, "global item with the reserved tag " + std::to_string(item.tag));
     }
   }
 
@@ -310,15 +312,15 @@ class DescriptorParser {
     const auto nibble = static_cast<int>(item.data & 0xF);
     const std::int64_t exponent = item.data <= 0xF ? (nibble < 8 ? nibble : nibble - 16) : item.as_signed();
     if (exponent < -8 || exponent > 7)
-      reject(item, "unit exponent " + std::to_string(exponent) + "; -8 to 7 are defined");
+      reject_item(item, "unit exponent " + std::to_string(exponent) + "; -8 to 7 are defined");
     global_.unit_exponent = static_cast<int>(exponent);
   }
 
   void set_report_id(const Item& item) {
     if (item.data == 0 || item.data > 255)
-      reject(item, "report id " + std::to_string(item.data) + "; 1 to 255 are allowed");
+      reject_item(item, "report id " + std::to_string(item.data) + "; 1 to 255 are allowed");
     if (!found_.reports.empty() && !found_.has_ids())
-      reject(item, "sets a report id, but previous fields have none; give all fields an id");
+      reject_item(item, "sets a report id, but previous fields have none; give all fields an id");
     global_.report_id = static_cast<std::uint8_t>(item.data);
   }
 
@@ -333,7 +335,7 @@ class DescriptorParser {
   }
 
   void add_range_end(const Item& item, std::optional<Item>& end) {
-    if (end) reject(item, "is a second end of a usage range without its other end");
+    if (end) reject_item(item, "is a second end of a usage range without its other end");
     end = item;
     if (!local_.usage_minimum || !local_.usage_maximum) return;
     const Item &first = *local_.usage_minimum, &last = *local_.usage_maximum;
@@ -349,9 +351,9 @@ class DescriptorParser {
 
   void set_delimiter(const Item& item) {
     const bool opens = item.data == 1;
-    if (item.data > 1) reject(item, "delimiter " + std::to_string(item.data) + "; 1 opens and 0 closes");
+    if (item.data > 1) reject_item(item, "delimiter " + std::to_string(item.data) + "; 1 opens and 0 closes");
     if (opens == local_.delimited)
-      reject(item, opens ? "opens a delimiter inside another" : "closes a delimiter, but none is open");
+      reject_item(item, opens ? "opens a delimiter inside another" : "closes a delimiter, but none is open");
     local_.delimited = opens;
     local_.alternatives = 0;
   }

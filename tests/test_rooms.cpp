@@ -46,6 +46,22 @@ std::vector<Include> includes_of(const std::string& room) {
   return found;
 }
 
+/// Returns the functions of a source's anonymous namespace. clang-format puts their names at the left border.
+std::set<std::string> private_functions(const fs::path& source) {
+  const std::regex function(
+      R"re(^(?!struct|class|enum|using|static_assert|template)[A-Za-z\[][^;=(]*\b(\w+)\()re");
+  std::set<std::string> names;
+  std::ifstream in(source);
+  std::smatch match;
+  bool is_private = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line == "namespace {") is_private = true;
+    if (line.rfind("}  // namespace", 0) == 0) is_private = false;
+    if (is_private && std::regex_search(line, match, function)) names.insert(match[1]);
+  }
+  return names;
+}
+
 }  // namespace
 
 TEST_CASE("a room includes only the rooms it may know", "[rooms]") {
@@ -97,6 +113,29 @@ TEST_CASE("a file of tests has a namespace of its name, and no code outside of i
     CHECK(closed);
   }
   CHECK(files > 200);
+}
+
+// Sources are compiled in groups (WRENCHD_UNITY). If two of a group had functions of one name, a call could
+// mean the function of the other source, whose parameters fit better.
+TEST_CASE("private functions of a library have names of their own", "[rooms]") {
+  const fs::path root = wrenchd::test::source_path();
+  std::map<std::string, std::map<std::string, std::string>> sources_of;  // by library and function
+  std::size_t functions = 0;
+  for (const auto& [room, allowed] : kMayInclude)
+    for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+      if (entry.path().extension() != ".cpp") continue;
+      const fs::path source = fs::relative(entry.path(), root);
+      // A folder of tools/ is a library, and so is the folder of the servo loop.
+      const fs::path folder = source.parent_path();
+      const std::string library = room == "tools" || folder == "daemon/servo" ? folder.string() : room;
+      for (const std::string& name : private_functions(entry.path())) {
+        const auto [at, is_new] = sources_of[library].emplace(name, source.string());
+        INFO(name << "() is in " << at->second << " and in " << source.string());
+        CHECK(is_new);
+        ++functions;
+      }
+    }
+  CHECK(functions > 500);
 }
 
 TEST_CASE("the firmware reference includes only the integer headers of C99", "[rooms]") {

@@ -51,7 +51,7 @@ std::string paragraph(const FaultRow& row) {
       row.name, row.message, row.detector, reaction_text(row), row.reason, row.cure);
 }
 
-std::string names_of(StateSet set) {
+std::string state_names(StateSet set) {
   std::string names;
   for (std::size_t s = 0; s < kStateCount; ++s)
     if (contains(set, static_cast<State>(s)))
@@ -90,8 +90,8 @@ std::string state_machine_text() {
                                : time_to_zero(row.reaction) == Duration{0}
                                    ? "1 tick"
                                    : fmt::format("{:.0f} ms", milliseconds(time_to_zero(row.reaction)));
-    text += fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", name(row.trigger), names_of(row.from), to,
-                        name(row.reaction), within, row.reason);
+    text += fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", name(row.trigger), state_names(row.from),
+                        to, name(row.reaction), within, row.reason);
   }
   return text;
 }

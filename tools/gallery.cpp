@@ -27,7 +27,7 @@ std::string first_sentence(const std::string& line) {
   return end == std::string::npos ? line : line.substr(0, end + 1);
 }
 
-std::string paragraph(const std::string& text) {
+std::string wrapped(const std::string& text) {
   std::istringstream words(text);
   std::string out, line;
   for (std::string word; words >> word; line += (line.empty() ? "" : " ") + word) {
@@ -63,7 +63,7 @@ std::string gallery_text(const SearchPath& search, const std::string& name) {
   std::string names;
   for (const GalleryScene& scene : all) {
     if (scene.name == name)
-      return paragraph(scene.description) + "\n    wrenchd --arm --live --config gallery/" + name +
+      return wrapped(scene.description) + "\n    wrenchd --arm --live --config gallery/" + name +
              ".toml\n\n" + "or, in a source tree, tools/run " + name + ". The file is " +
              scene.file.string() + ".\n";
     known.push_back(scene.name);

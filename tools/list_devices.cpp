@@ -33,18 +33,18 @@ using Interfaces = std::span<const Entry>;
 
 constexpr std::size_t kLongestName = 60, kLongestReason = 400;
 
-std::string to_printable(const std::string& text, std::size_t longest) {
+std::string short_printable(const std::string& text, std::size_t longest) {
   return printable(wrenchd::to_printable(text), longest);
 }
 
-UsbDevice to_printable(UsbDevice device) {
+UsbDevice short_printable(UsbDevice device) {
   for (std::string* text : {&device.serial, &device.manufacturer, &device.product_name})
-    *text = to_printable(*text, kLongestName);
+    *text = short_printable(*text, kLongestName);
   return device;
 }
 
 Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profiles) {
-  Entry entry{to_printable(device), inspect_device(device), {}, false, false};
+  Entry entry{short_printable(device), inspect_device(device), {}, false, false};
   entry.match = match_profile(entry.facts.identity, profiles);
   entry.matches_if_named = std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
     return match_profile(entry.facts.identity, std::span(&profile, 1), profile.name).profile.has_value();
@@ -114,7 +114,7 @@ std::string who(const UsbDevice& device) {
   return text;
 }
 
-std::string head(const UsbDevice& device) {
+std::string device_head(const UsbDevice& device) {
   return where(device) + (device.interface < 0 ? "" : ", interface " + std::to_string(device.interface)) +
          ": " + who(device) +
          (device.serial.empty() ? ", no serial number" : ", serial number " + device.serial) + '\n';
@@ -186,7 +186,7 @@ std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profil
   std::vector<std::pair<std::string, std::string>> names_by_reason;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     if (entry.match.profile == i) continue;
-    std::string reason = to_printable(entry.match.rejections[i], kLongestReason);
+    std::string reason = short_printable(entry.match.rejections[i], kLongestReason);
     if (reason.empty())
       reason = entry.match.profile ? "this profile also matches, but less specifically"
                                    : "this profile also matches";
@@ -209,10 +209,10 @@ std::string paragraph_of_matched(const Entry& entry, const DeviceProfile& profil
          degrees_of_freedom(profile) + agreement(entry.facts, profile);
 }
 
-std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& profiles,
-                      const OpenCheck& why_not_open) {
+std::string entry_paragraph(const Entry& entry, const std::vector<DeviceProfile>& profiles,
+                            const OpenCheck& why_not_open) {
   const UsbDevice& device = entry.printable;
-  const std::string begin = head(device);
+  const std::string begin = device_head(device);
   if (entry.match.profile) {
     const DeviceProfile& profile = profiles[*entry.match.profile];
     const std::string others = why_not(entry, profiles);
@@ -277,7 +277,8 @@ std::string device_list(std::span<const UsbDevice> devices, const KnownProfiles&
   std::string paragraphs, lines;
   for (const Interfaces device : by_device(entries)) {
     const auto tell = described_interfaces(device, all);
-    for (const Entry* entry : tell) paragraphs += paragraph(*entry, known.profiles, why_not_open) + '\n';
+    for (const Entry* entry : tell)
+      paragraphs += entry_paragraph(*entry, known.profiles, why_not_open) + '\n';
     if (tell.empty()) lines += in_one_line(device);
   }
   std::string text = paragraphs;

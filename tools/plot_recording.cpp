@@ -46,7 +46,7 @@ std::array<double, 2> penetration(const TickRecord& tick) {
 
 /// Writes at most kMaxRows rows. Each row shows the tick with the largest force of its interval, so that no
 /// peak is lost.
-std::string over_time_csv(const Recording& recording) {
+std::string recording_csv(const Recording& recording) {
   std::ostringstream csv;
   csv << "t,fx,fy,fz,f,tx,ty,tz,torque,depth_mm,rotation_deg,in_mJ,out_mJ,injected_mJ,armed,"
          "px,py,pz,qx,qy,qz\n";
@@ -131,7 +131,7 @@ void write_tables(const Recording& recording, const fs::path& directory, const s
   const auto write = [&](const char* name, const std::string& text) {
     write_output((directory / name).string(), text);
   };
-  write("run.csv", over_time_csv(recording));
+  write("run.csv", recording_csv(recording));
   write("ticks.csv", tick_times_csv(recording));
   write("figures.gp", variables + kPlotScript);
 }

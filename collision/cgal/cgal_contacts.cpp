@@ -11,7 +11,7 @@ namespace {
 
 using namespace sweep_tolerance;
 
-Triangle triangle_of(const MeshSurface& surface, std::uint32_t t) {
+Triangle face_corners(const MeshSurface& surface, std::uint32_t t) {
   return {surface.corner_m(t, 0), surface.corner_m(t, 1), surface.corner_m(t, 2)};
 }
 
@@ -124,7 +124,7 @@ bool CgalContacts::end_pose_overlaps() const {
     near.tree->find_pairs(*tool_tree_, X_OT, X_OT, clearance_m_, pairs);
     const bool overlaps = std::any_of(pairs.begin(), pairs.end(), [&](const CgalMeshTree::Pair& pair) {
       return exact::triangles_intersect(moved_triangle(near.view, pair.a).end,
-                                        triangle_of(near.tree->surface(), pair.b));
+                                        face_corners(near.tree->surface(), pair.b));
     });
     if (overlaps) return true;
   }
@@ -134,7 +134,7 @@ bool CgalContacts::end_pose_overlaps() const {
 CgalContacts::MovedTriangle CgalContacts::moved_triangle(const ObstacleView& view,
                                                          std::uint32_t triangle) const {
   const MeshSurface& tool = tool_tree_->surface();
-  const Triangle in_T = triangle_of(tool, triangle);
+  const Triangle in_T = face_corners(tool, triangle);
   const MeshSurface::Plane& plane = tool.planes()[triangle];
   const auto plane_in_O = [&](const Frame& X_OT) -> MeshSurface::Plane {
     const Vector3d normal = X_OT.R * plane.normal;
@@ -173,7 +173,7 @@ void CgalContacts::test_pair(const ObstacleView& view, const MovedTriangle& a, s
                              SweepResult& result) {
   const MeshSurface& tool = tool_tree_->surface();
   const MeshSurface& surface = view.obstacle->mesh->surface;
-  const Triangle b_in_O = triangle_of(surface, b);
+  const Triangle b_in_O = face_corners(surface, b);
   const MeshSurface::Plane& plane = surface.planes()[b];
   if (plane_separates(plane, plane, a.start, a.end, 0.0)) return;
   // In the tool's frame the obstacle's path deviates from a straight line.
@@ -236,7 +236,8 @@ std::optional<CgalContacts::VertexPass> CgalContacts::vertex_pass_on_side(
   if (pass.closes)
     pass.path_fraction = closing_time(height_m(side, p_start), height_m(side, p_end), clearance_m_);
   pass.p_m = interpolate(p_start, p_end, pass.path_fraction);
-  if (!exact::projects_inside(pass.p_m, triangle_of(face_body, triangle), face_body.planes()[triangle].normal,
+  if (!exact::projects_inside(pass.p_m, face_corners(face_body, triangle),
+                              face_body.planes()[triangle].normal,
                               pass.closes ? feature_margin_m_ : kTouch * clearance_m_))
     return {};
   if (face_body.kind() == MeshSurface::Kind::surface && slope_tolerance_ < kAnySlope &&

@@ -23,7 +23,7 @@ constexpr double kMinFallAngle_rad = 1e-7;
 /// acts as a border.
 constexpr double kMinWedge = 1e-3;
 
-constexpr int next(int i) noexcept {
+constexpr int next_corner(int i) noexcept {
   return i == 2 ? 0 : i + 1;
 }
 
@@ -79,7 +79,7 @@ std::vector<MeshSurface::CrowdedEdge> MeshSurface::find_neighbours() {
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const std::uint64_t a = mesh_.triangles[t][static_cast<std::size_t>(i)];
-      const std::uint64_t b = mesh_.triangles[t][static_cast<std::size_t>(next(i))];
+      const std::uint64_t b = mesh_.triangles[t][static_cast<std::size_t>(next_corner(i))];
       half_edges.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
     }
   std::sort(half_edges.begin(), half_edges.end(), [](const TriangleHalfEdge& a, const TriangleHalfEdge& b) {
@@ -131,7 +131,8 @@ double MeshSurface::angle_at(std::uint32_t triangle, std::uint32_t vertex) const
   int i = 0;
   while (i < 2 && mesh_.triangles[triangle][static_cast<std::size_t>(i)] != vertex) ++i;
   const Vector3d& p = corner_m(triangle, i);
-  const Vector3d to = corner_m(triangle, next(i)) - p, back = corner_m(triangle, next(next(i))) - p;
+  const Vector3d to = corner_m(triangle, next_corner(i)) - p,
+                 back = corner_m(triangle, next_corner(next_corner(i))) - p;
   return std::atan2(to.cross(back).norm(), to.dot(back));
 }
 
@@ -141,7 +142,7 @@ bool MeshSurface::is_wound_alike(std::uint32_t triangle, std::size_t side,
   const std::uint32_t from = corners[side], to = corners[side == 2 ? 0 : side + 1];
   for (int k = 0; k < 3; ++k)
     if (mesh_.triangles[other][static_cast<std::size_t>(k)] == from)
-      return mesh_.triangles[other][static_cast<std::size_t>(next(k))] != to;
+      return mesh_.triangles[other][static_cast<std::size_t>(next_corner(k))] != to;
   return true;
 }
 
@@ -209,7 +210,7 @@ double MeshSurface::height_beyond_m(TriangleSide side, std::uint32_t other) cons
 void MeshSurface::add_edge(TriangleSide side, std::uint32_t other, std::array<std::int32_t, 2> sides) {
   const Corners& corners = mesh_.triangles[side.triangle];
   features_[side.triangle].edges[side.side] = static_cast<std::uint32_t>(convex_edges_.size());
-  convex_edges_.push_back({{corners[side.side], corners[static_cast<std::size_t>(next(side.side))]},
+  convex_edges_.push_back({{corners[side.side], corners[static_cast<std::size_t>(next_corner(side.side))]},
                            {side.triangle, other},
                            sides});
 }
@@ -230,7 +231,7 @@ void MeshSurface::add_crowded_edge(const CrowdedEdge& faces) {
   const Corners& corners = mesh_.triangles[faces[0].triangle];
   const Vector3d& origin = mesh_.vertices_m[corners[faces[0].side]];
   const Vector3d along =
-      (mesh_.vertices_m[corners[static_cast<std::size_t>(next(faces[0].side))]] - origin).normalized();
+      (mesh_.vertices_m[corners[static_cast<std::size_t>(next_corner(faces[0].side))]] - origin).normalized();
   /// A face as a half-line in the plane perpendicular to the edge.
   struct Ray {
     double angle;
@@ -240,7 +241,7 @@ void MeshSurface::add_crowded_edge(const CrowdedEdge& faces) {
   std::vector<Ray> rays;
   Vector3d x = Vector3d::Zero(), y = Vector3d::Zero();
   for (const TriangleSide& face : faces) {
-    const Vector3d apex = corner_m(face.triangle, next(next(face.side))) - origin;
+    const Vector3d apex = corner_m(face.triangle, next_corner(next_corner(face.side))) - origin;
     const Vector3d direction = (apex - along.dot(apex) * along).normalized();
     if (rays.empty()) x = direction, y = along.cross(direction);
     rays.push_back({std::atan2(y.dot(direction), x.dot(direction)), direction, face});

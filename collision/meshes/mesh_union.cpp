@@ -23,7 +23,7 @@ namespace PMP = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-SurfaceMesh surface_mesh(const TriangleMesh& mesh) {
+SurfaceMesh cgal_mesh(const TriangleMesh& mesh) {
   SurfaceMesh out;
   for (const Vector3d& p : mesh.vertices_m) out.add_vertex({p.x(), p.y(), p.z()});
   using Vertex = SurfaceMesh::Vertex_index;
@@ -84,7 +84,7 @@ UnitedMesh unite(const std::vector<TriangleMesh>& parts) {
   }
   SurfaceMesh all;
   out.united = std::all_of(parts.begin(), parts.end(), [&](const TriangleMesh& part) {
-    SurfaceMesh one = surface_mesh(part);
+    SurfaceMesh one = cgal_mesh(part);
     return one.number_of_faces() == part.triangles.size() && add_part(std::move(one), all);
   });
   if (out.united) {

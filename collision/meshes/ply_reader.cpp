@@ -214,7 +214,7 @@ bool is_strip(const PlyElement& element) {
   return element.name == "tristrips" || element.name == "tristrip";
 }
 
-void check_elements(const MeshSource& source, const PlyHeader& header) {
+void check_ply_elements(const MeshSource& source, const PlyHeader& header) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty())
       source.reject(0, "element " + quote_word(element.name) + " has no properties; export the mesh again");
@@ -354,7 +354,7 @@ void read_item(const MeshSource& source, const PlyElement& element, const UsedPr
 PolygonSoup read_ply(const MeshSource& source) {
   LineReader lines(source.bytes);
   const PlyHeader header = read_header(source, lines);
-  check_elements(source, header);
+  check_ply_elements(source, header);
   ValueReader reader(lines.rest(), header);
   PolygonSoup soup;
   std::vector<double> values;

@@ -7,11 +7,11 @@
 namespace wrenchd {
 namespace {
 
-simd::Transform single(const Pose& X) noexcept {
+simd::Transform single_transform(const Pose& X) noexcept {
   return simd::to_single(X.rotation.toRotationMatrix(), X.translation_m);
 }
 
-simd::Transform displacement(const Pose& from, const Pose& to) noexcept {
+simd::Transform displacement_between(const Pose& from, const Pose& to) noexcept {
   return simd::to_single(to.rotation.toRotationMatrix() - from.rotation.toRotationMatrix(),
                          to.translation_m - from.translation_m);
 }
@@ -26,12 +26,12 @@ simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, doub
   simd::RelativeMotion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
-  motion.X_BA_middle = single(middle);
-  motion.X_AB_middle = single(inverse(middle));
-  motion.X_BA_start = single(start);
-  motion.X_BA_end = single(end);
-  motion.displacement_BA = displacement(start, end);
-  motion.displacement_AB = displacement(inverse(start), inverse(end));
+  motion.X_BA_middle = single_transform(middle);
+  motion.X_AB_middle = single_transform(inverse(middle));
+  motion.X_BA_start = single_transform(start);
+  motion.X_BA_end = single_transform(end);
+  motion.displacement_BA = displacement_between(start, end);
+  motion.displacement_AB = displacement_between(inverse(start), inverse(end));
   const double angle = start.rotation.angularDistance(end.rotation);
   const double arc_deviation_m = 0.25 * angle * angle * radius_a_m;
   const double rounding_m =

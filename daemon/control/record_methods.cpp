@@ -22,7 +22,7 @@ MethodResult start(Recordings& recordings, const Json& params, const Caller& cal
   }
 }
 
-MethodResult stop(Recordings& recordings) {
+MethodResult stop_recording(Recordings& recordings) {
   if (const auto written = recordings.stop()) return written_json(*written);
   const std::string failed = recordings.status().failed;
   throw RpcError(RpcCode::invalid_state,
@@ -110,7 +110,7 @@ void add_record_methods(MethodTable& table, Recordings& recordings) {
                       Role::operator_,
                       {},
                       "Ends the recording. Returns file, ticks, and lost: the number of missing ticks.",
-                      [&recordings](const Json&, const Caller&) { return stop(recordings); },
+                      [&recordings](const Json&, const Caller&) { return stop_recording(recordings); },
                       true});
   table.add(MethodRow{
       "record.status",

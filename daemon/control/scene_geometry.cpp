@@ -18,7 +18,7 @@
 namespace wrenchd {
 namespace {
 
-[[noreturn]] void reject(const char* what) {
+[[noreturn]] void reject_with_errno(const char* what) {
   throw std::system_error(errno, std::generic_category(),
                           std::string("the shared memory of the scene geometry: ") + what);
 }
@@ -81,12 +81,12 @@ SceneGeometry::SceneGeometry(std::shared_ptr<const Scene> scene) : scene_(std::m
     bytes_ += 12 * (vertices + triangles);
   }
   descriptor_ = memfd_create("wrenchd-shapes", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-  if (descriptor_ < 0) reject("memfd_create");
+  if (descriptor_ < 0) reject_with_errno("memfd_create");
   const auto give_up = [this](const char* what) {
     const int error = errno;
     close(descriptor_);
     errno = error;
-    reject(what);
+    reject_with_errno(what);
   };
   if (ftruncate(descriptor_, static_cast<off_t>(bytes_)) != 0) give_up("ftruncate");
   void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor_, 0);

@@ -53,7 +53,7 @@ hid_t text_member(std::size_t bytes) {
   return type;
 }
 
-hid_t row_type() {
+hid_t event_row_type() {
   const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(StoredEvent));
   H5Tinsert(row, "time_ns", offsetof(StoredEvent, time_ns), H5T_NATIVE_INT64);
   H5Tinsert(row, "tick", offsetof(StoredEvent, tick), H5T_NATIVE_INT64);
@@ -126,7 +126,8 @@ std::size_t event_row_bytes() noexcept {
   return sizeof(StoredEvent);
 }
 
-EventTable::EventTable(hid_t file) : row_(row_type(), H5Tclose), set_(create_set(file, row_), H5Dclose) {}
+EventTable::EventTable(hid_t file)
+    : row_(event_row_type(), H5Tclose), set_(create_set(file, row_), H5Dclose) {}
 
 bool EventTable::append(std::span<const RecordedEvent> events) {
   if (events.empty()) return true;
@@ -162,7 +163,7 @@ EventsRead read_events(hid_t set, std::uint64_t most_rows) {
     return {{}, "is not one-dimensional; the file is damaged"};
   if (count > most_rows) return {{}, "cannot have as many rows as its header states; the file is damaged"};
   std::vector<StoredEvent> rows(count);
-  const H5Handle row(row_type(), H5Tclose);
+  const H5Handle row(event_row_type(), H5Tclose);
   if (count > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0)
     return {{}, "cannot be read; the file is damaged or truncated"};
   while (!rows.empty() && rows.back().name[0] == '\0') rows.pop_back();

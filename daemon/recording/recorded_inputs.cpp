@@ -39,7 +39,7 @@ const RecordedFile* find(const RecordingHeader& header, const std::string& role)
   return nullptr;
 }
 
-void write(const fs::path& file, const std::string& bytes) {
+void write_input(const fs::path& file, const std::string& bytes) {
   fs::create_directories(file.parent_path());
   std::ofstream out(file, std::ios::binary);
   out << bytes;
@@ -56,7 +56,7 @@ fs::path mesh_at(const RecordingHeader& header, const std::string& role, const f
                          "--config");
   if (mesh->embedded) {
     const fs::path file = directory / "meshes" / (role + mesh->path.extension().string());
-    write(file, mesh->bytes);
+    write_input(file, mesh->bytes);
     return file;
   }
   const auto bytes = read_file_if_readable(mesh->path);
@@ -76,7 +76,7 @@ TomlEntry* find(TomlNode& table, const std::string& key) {
   return nullptr;
 }
 
-TomlNode& add(TomlNode::Table& table, const std::string& key) {
+TomlNode& add_node(TomlNode::Table& table, const std::string& key) {
   table.emplace_back().key = key;
   return table.back().node;
 }
@@ -88,7 +88,7 @@ void set(TomlNode* table, const std::string& key, const std::string& value) {
     entry->node.value = value;
     return;
   }
-  if (auto* entries = std::get_if<TomlNode::Table>(&table->value)) add(*entries, key).value = value;
+  if (auto* entries = std::get_if<TomlNode::Table>(&table->value)) add_node(*entries, key).value = value;
 }
 
 /// Returns the table `key` of a table, and creates it if it is missing.
@@ -96,7 +96,7 @@ TomlNode* table_in(TomlNode& root, const std::string& key) {
   if (TomlEntry* const entry = find(root, key)) return &entry->node;
   auto* entries = std::get_if<TomlNode::Table>(&root.value);
   if (entries == nullptr) return nullptr;
-  TomlNode& made = add(*entries, key);
+  TomlNode& made = add_node(*entries, key);
   made.value = TomlNode::Table{};
   return &made;
 }
@@ -173,7 +173,7 @@ DeviceProfile profile_of(const RecordingHeader& header, const fs::path& director
   const auto put = [&](const fs::path& at, const std::string& text) {
     places.push_back(directory / ("chain_" + std::to_string(places.size())));
     const fs::path file = places.back() / "profiles" / at.filename();
-    write(file, text);
+    write_input(file, text);
     return file;
   };
   const fs::path nearest = put(header.profile_file, header.profile);
@@ -245,14 +245,14 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
         "--scene and --profile");
   const RecordedFile* const script = find(header, "hand_script");
   const fs::path hand = directory / "hand.toml";
-  write(hand, script == nullptr ? "" : script->bytes);
+  write_input(hand, script == nullptr ? "" : script->bytes);
   RunConfig config;
   config.profile = profile_of(header, directory);
   config.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
   config.second_hand = choose_hand(tree, header);
   config.is_second = !header.hand.empty();
-  write(directory / "scene.toml", header.scene);
+  write_input(directory / "scene.toml", header.scene);
   set(&tree, "scene", (directory / "scene.toml").string());
   set(table_in(tree, "device"), "profile",
       (directory / "chain_0" / "profiles" / header.profile_file.filename()).string());

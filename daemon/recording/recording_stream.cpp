@@ -57,7 +57,7 @@ class Reader {
   std::string_view rest_;
 };
 
-RecordingHeader read_header(std::string_view bytes) {
+RecordingHeader header_from(std::string_view bytes) {
   Reader in(bytes);
   RecordingHeader header;
   for (std::string* text : {&header.version, &header.settings, &header.scene, &header.profile,
@@ -265,7 +265,7 @@ ReceivedRecording receive_recording(int pipe, const std::filesystem::path& file,
                            " MiB, which is more than its size allows; the file is damaged");
     left -= bytes;
     if (kind == kHeader) {
-      received.header = read_header(read_bytes(stream, bytes));
+      received.header = header_from(read_bytes(stream, bytes));
     } else if (kind == kTicks) {
       read_rows(stream, bytes, received.ticks);
     } else if (kind == kContacts) {

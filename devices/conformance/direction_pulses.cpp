@@ -27,11 +27,11 @@ constexpr Duration kMotorsOn = 30ms;
 /// Two couplings of a symmetric response differ by at most this share of the larger one.
 constexpr double kMaxAsymmetry = 0.5;
 
-const char* name_of(int axis) {
+const char* axis_name(int axis) {
   return kAxisNames[static_cast<std::size_t>(axis)];
 }
 
-bool contains(DofMask axes, int axis) {
+bool has_axis(DofMask axes, int axis) {
   return (axes >> axis & 1) != 0;
 }
 
@@ -71,7 +71,7 @@ int DirectionPulses::Response::strongest_axis() const {
 }
 
 std::string DirectionPulses::Response::text(int axis) const {
-  return fmt::format("{}: {:+.3f} {}", name_of(axis), 1e3 * mean[axis], force ? "mm" : "mrad");
+  return fmt::format("{}: {:+.3f} {}", axis_name(axis), 1e3 * mean[axis], force ? "mm" : "mrad");
 }
 
 RuleFinding DirectionPulses::judge_force(double pulse_N, DofMask axes, double least_m) {
@@ -86,10 +86,10 @@ RuleFinding DirectionPulses::judge_torque(double pulse_Nm, DofMask axes, double 
 RuleFinding DirectionPulses::judge(bool force, double size, DofMask axes, double least) {
   Responses responses;
   for (int axis = 0; axis < 3; ++axis)
-    if (contains(axes, axis)) responses[static_cast<std::size_t>(axis)] = apply(force, axis, size, least);
+    if (has_axis(axes, axis)) responses[static_cast<std::size_t>(axis)] = apply(force, axis, size, least);
   std::string wrong, right, unclear;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!contains(axes, axis)) continue;
+    if (!has_axis(axes, axis)) continue;
     const Response& r = responses[static_cast<std::size_t>(axis)];
     const std::string error = error_of(responses, axes, axis);
     if (!error.empty())
@@ -97,7 +97,7 @@ RuleFinding DirectionPulses::judge(bool force, double size, DofMask axes, double
     else if (r.is_significant(axis))
       append(right, r.text(axis));
     else
-      unclear += fmt::format(" {}{}", name_of(axis), r.stopped ? " (the handle moved too far)" : "");
+      unclear += fmt::format(" {}{}", axis_name(axis), r.stopped ? " (the handle moved too far)" : "");
   }
   if (!wrong.empty()) return {Judgement::fail, wrong};
   if (!unclear.empty())
@@ -112,7 +112,7 @@ std::string DirectionPulses::error_of(const Responses& responses, DofMask axes, 
   if (r.is_significant(axis) && r.mean[axis] < 0.0 && strongest == axis)
     return r.text(axis) + ", the sign is inverted";
   if (r.is_significant(strongest) && strongest != axis && !is_coupling(responses, axes, axis, strongest))
-    return fmt::format("{} moves the handle along {}", name_of(axis), name_of(strongest));
+    return fmt::format("{} moves the handle along {}", axis_name(axis), axis_name(strongest));
   return {};
 }
 
@@ -122,7 +122,7 @@ std::string DirectionPulses::error_of(const Responses& responses, DofMask axes, 
 bool DirectionPulses::is_coupling(const Responses& responses, DofMask axes, int axis, int strongest) {
   const Response& a = responses[static_cast<std::size_t>(axis)];
   if (!a.is_significant(axis) || a.mean[axis] < 0.0) return false;
-  if (!contains(axes, strongest)) return true;
+  if (!has_axis(axes, strongest)) return true;
   const Response& s = responses[static_cast<std::size_t>(strongest)];
   const double A_sa = a.mean[strongest], A_as = s.mean[axis];
   return s.mean[strongest] * a.mean[axis] > A_sa * A_as &&

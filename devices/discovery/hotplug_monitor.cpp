@@ -11,6 +11,7 @@
 #include <libudev.h>
 #include <poll.h>
 
+#include "devices/discovery/udev_text.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "devices/links/wake_up.hpp"
 
@@ -27,10 +28,6 @@ const char* source_name(HotplugMonitor::Source source) {
   if (source == HotplugMonitor::Source::automatic)
     source = udev_runs() ? HotplugMonitor::Source::udev : HotplugMonitor::Source::kernel;
   return source == HotplugMonitor::Source::udev ? "udev" : "kernel";
-}
-
-std::string text(const char* s) {
-  return s == nullptr ? std::string() : std::string(s);
 }
 
 }  // namespace
@@ -75,8 +72,8 @@ struct HotplugMonitor::Watch {
     const std::string_view action = udev_device_get_action(device);
     if (action != "add" && action != "remove") return;
     listener({action == "add" ? HotplugEvent::Kind::connected : HotplugEvent::Kind::disconnected,
-              text(udev_device_get_subsystem(device)), text(udev_device_get_devnode(device)),
-              port_path_in(text(udev_device_get_devpath(device)))});
+              udev_text(udev_device_get_subsystem(device)), udev_text(udev_device_get_devnode(device)),
+              port_path_in(udev_text(udev_device_get_devpath(device)))});
   }
 
   Listener listener;

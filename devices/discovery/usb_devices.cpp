@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "core/files/opened_file.hpp"
+#include "devices/discovery/udev_text.hpp"
 
 namespace wrenchd {
 namespace {
@@ -32,12 +33,8 @@ using UdevDevice = std::unique_ptr<udev_device, Release>;
 
 constexpr int kHubClass = 9;
 
-std::string text(const char* s) {
-  return s == nullptr ? std::string() : std::string(s);
-}
-
 std::string attribute(udev_device* device, const char* name) {
-  return text(udev_device_get_sysattr_value(device, name));
+  return udev_text(udev_device_get_sysattr_value(device, name));
 }
 
 int number(std::string_view digits, int base) {
@@ -105,8 +102,8 @@ std::vector<std::uint8_t> read_bytes(const std::string& file) {
 // --- one device -------------------------------------------------------------------------------------------
 
 void read_usb_properties(UsbDevice& device, udev_device* usb) {
-  device.port_path = text(udev_device_get_sysname(usb));
-  device.usb_node = text(udev_device_get_devnode(usb));
+  device.port_path = udev_text(udev_device_get_sysname(usb));
+  device.usb_node = udev_text(udev_device_get_devnode(usb));
   device.vendor = static_cast<std::uint16_t>(number(attribute(usb, "idVendor"), 16));
   device.product = static_cast<std::uint16_t>(number(attribute(usb, "idProduct"), 16));
   device.serial = without_control_characters(attribute(usb, "serial"));
@@ -116,21 +113,22 @@ void read_usb_properties(UsbDevice& device, udev_device* usb) {
 
 /// The uevent of a HID device that is not on USB contains its ids: HID_ID=0005:00001209:00006D0F.
 void read_hid_properties(UsbDevice& device, udev_device* hid) {
-  const std::string id = text(udev_device_get_property_value(hid, "HID_ID"));
+  const std::string id = udev_text(udev_device_get_property_value(hid, "HID_ID"));
   const std::size_t first = id.find(':');
   const std::size_t second = first == std::string::npos ? first : id.find(':', first + 1);
   if (second != std::string::npos) {
     device.vendor = static_cast<std::uint16_t>(number(std::string_view(id).substr(first + 1, 8), 16));
     device.product = static_cast<std::uint16_t>(number(std::string_view(id).substr(second + 1, 8), 16));
   }
-  device.serial = without_control_characters(text(udev_device_get_property_value(hid, "HID_UNIQ")));
-  device.product_name = without_control_characters(text(udev_device_get_property_value(hid, "HID_NAME")));
+  device.serial = without_control_characters(udev_text(udev_device_get_property_value(hid, "HID_UNIQ")));
+  device.product_name =
+      without_control_characters(udev_text(udev_device_get_property_value(hid, "HID_NAME")));
 }
 
 UsbDevice from_hidraw(udev_device* hidraw, udev_device* hid) {
   UsbDevice device;
-  device.hidraw_node = text(udev_device_get_devnode(hidraw));
-  device.report_descriptor = read_bytes(text(udev_device_get_syspath(hid)) + "/report_descriptor");
+  device.hidraw_node = udev_text(udev_device_get_devnode(hidraw));
+  device.report_descriptor = read_bytes(udev_text(udev_device_get_syspath(hid)) + "/report_descriptor");
   read_descriptor(device);
   return device;
 }
@@ -185,7 +183,7 @@ std::vector<UsbDevice> list_usb_devices() {
     udev_device* const interface =
         udev_device_get_parent_with_subsystem_devtype(hidraw.get(), "usb", "usb_interface");
     if (interface != nullptr) {
-      on_usb[text(udev_device_get_syspath(interface))].push_back(std::move(device));
+      on_usb[udev_text(udev_device_get_syspath(interface))].push_back(std::move(device));
     } else {
       read_hid_properties(device, hid);
       found.push_back(std::move(device));
@@ -193,12 +191,12 @@ std::vector<UsbDevice> list_usb_devices() {
   }
 
   for (const UdevDevice& interface : devices_of(context.get(), "usb")) {
-    if (text(udev_device_get_devtype(interface.get())) != "usb_interface") continue;
+    if (udev_text(udev_device_get_devtype(interface.get())) != "usb_interface") continue;
     if (number(attribute(interface.get(), "bInterfaceClass"), 16) == kHubClass) continue;
     udev_device* const usb =
         udev_device_get_parent_with_subsystem_devtype(interface.get(), "usb", "usb_device");
     if (usb == nullptr) continue;
-    std::vector<UsbDevice>& here = on_usb[text(udev_device_get_syspath(interface.get()))];
+    std::vector<UsbDevice>& here = on_usb[udev_text(udev_device_get_syspath(interface.get()))];
     if (here.empty()) here.emplace_back();
     for (UsbDevice& device : here) {
       device.interface = number(attribute(interface.get(), "bInterfaceNumber"), 16);

@@ -17,7 +17,7 @@ namespace {
 /// Each call is non-blocking by its flags, because the parent process shares the flags of the descriptor.
 constexpr int kNonBlocking = MSG_DONTWAIT | MSG_NOSIGNAL;
 
-[[noreturn]] void reject(int socket, const std::string& why) {
+[[noreturn]] void reject_socket(int socket, const std::string& why) {
   throw std::runtime_error("device socket " + std::to_string(socket) + ": " + why);
 }
 
@@ -46,9 +46,10 @@ void SocketLink::open() {
   int type = 0;
   socklen_t size = sizeof type;
   if (getsockopt(socket_, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_SEQPACKET)
-    reject(socket_, "is no SOCK_SEQPACKET socket; the parent process must pass one end of a socketpair()");
+    reject_socket(socket_,
+                  "is no SOCK_SEQPACKET socket; the parent process must pass one end of a socketpair()");
   fcntl(socket_, F_SETFD, FD_CLOEXEC);  // child processes must not inherit the device
-  if (peer_closed(socket_)) reject(socket_, "the other end is closed; restart both programs");
+  if (peer_closed(socket_)) reject_socket(socket_, "the other end is closed; restart both programs");
   writer_.emplace([socket = socket_](auto report) { return send_report(socket, report); }, settings_);
 }
 

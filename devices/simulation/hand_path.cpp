@@ -19,7 +19,7 @@ Pose pose_of(const Waypoint& w) {
   return {rotation_from(w.rotation_vector_rad), w.position_m};
 }
 
-[[noreturn]] void reject(std::size_t index, const std::string& why) {
+[[noreturn]] void reject_waypoint(std::size_t index, const std::string& why) {
   throw std::invalid_argument("hand path, waypoint " + std::to_string(index + 1) + ": " + why);
 }
 
@@ -28,10 +28,10 @@ void check_each(const std::vector<Waypoint>& waypoints) {
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const Waypoint& w = waypoints[i];
     if (!is_finite(w.time_s) || !is_finite(w.position_m) || !is_finite(w.rotation_vector_rad))
-      reject(i, "a number is not finite");
-    if (i == 0 && w.time_s != 0.0) reject(i, "the first waypoint must be at time 0");
+      reject_waypoint(i, "a number is not finite");
+    if (i == 0 && w.time_s != 0.0) reject_waypoint(i, "the first waypoint must be at time 0");
     if (i > 0 && from_seconds(w.time_s) <= from_seconds(waypoints[i - 1].time_s))
-      reject(i, "its time must be later than that of the previous waypoint");
+      reject_waypoint(i, "its time must be later than that of the previous waypoint");
   }
 }
 
@@ -41,8 +41,8 @@ void check_closed(const std::vector<Waypoint>& waypoints) {
   const double gap = std::max((last.position_m - first.position_m).cwiseAbs().maxCoeff(),
                               (last.rotation_vector_rad - first.rotation_vector_rad).cwiseAbs().maxCoeff());
   if (gap > kClosure)
-    reject(waypoints.size() - 1,
-           "a repeating path must end at its start; repeat the first position and rotation here");
+    reject_waypoint(waypoints.size() - 1,
+                    "a repeating path must end at its start; repeat the first position and rotation here");
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ double number(const std::string& word, const std::string& place) {
   return *x;
 }
 
-Vector3d three(const std::string& text, const std::string& place) {
+Vector3d vector_from(const std::string& text, const std::string& place) {
   std::vector<std::string_view> words;
   split_words(text, words);
   if (words.size() != 3)
@@ -59,9 +59,10 @@ Pose origin(const Element& parent, const std::string& place) {
   const auto element = parent.get_child_optional("origin");
   Pose X;
   if (!element) return X;
-  if (const auto xyz = attribute(*element, "xyz")) X.translation_m = three(*xyz, place + ", origin xyz");
+  if (const auto xyz = attribute(*element, "xyz"))
+    X.translation_m = vector_from(*xyz, place + ", origin xyz");
   if (const auto rpy = attribute(*element, "rpy")) {
-    const Vector3d a = three(*rpy, place + ", origin rpy");
+    const Vector3d a = vector_from(*rpy, place + ", origin rpy");
     X.rotation = rotation_from(a.z() * Vector3d::UnitZ()) * rotation_from(a.y() * Vector3d::UnitY()) *
                  rotation_from(a.x() * Vector3d::UnitX());
   }
@@ -96,7 +97,7 @@ Joint read_joint(const Element& element) {
   }
   joint.X_PJ = origin(element, place);
   if (const auto axis = element.get_child_optional("axis")) {
-    joint.axis = three(required(*axis, "xyz", place + ", axis"), place + ", axis");
+    joint.axis = vector_from(required(*axis, "xyz", place + ", axis"), place + ", axis");
     if (!(joint.axis.norm() > 1e-9)) throw ImportError(place + ": its axis is zero; correct it");
   }
   joint.axis.normalize();
@@ -118,11 +119,11 @@ void read_geometry(const Element& collision, const std::string& place, UrdfShape
   if (const auto mesh = geometry->get_child_optional("mesh")) {
     shape.kind = UrdfShape::Kind::mesh;
     shape.mesh = required(*mesh, "filename", place + ", mesh");
-    if (const auto scale = attribute(*mesh, "scale")) shape.scale = three(*scale, place + ", scale");
+    if (const auto scale = attribute(*mesh, "scale")) shape.scale = vector_from(*scale, place + ", scale");
     if (shape.scale.cwiseAbs().minCoeff() <= 0.0) throw ImportError(place + ": a scale is 0; correct it");
   } else if (const auto box = geometry->get_child_optional("box")) {
     shape.kind = UrdfShape::Kind::box;
-    shape.size_m = three(required(*box, "size", place + ", box"), place + ", size");
+    shape.size_m = vector_from(required(*box, "size", place + ", box"), place + ", size");
     if (shape.size_m.minCoeff() <= 0.0) throw ImportError(place + ": a side is not above 0; correct it");
   } else if (const auto cylinder = geometry->get_child_optional("cylinder")) {
     shape.kind = UrdfShape::Kind::cylinder;

@@ -136,7 +136,7 @@ struct Around {
   }
 };
 
-void append(std::vector<float>& to, const Vector3d& v) {
+void append_floats(std::vector<float>& to, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) to.push_back(static_cast<float>(v[i]));
 }
 
@@ -156,8 +156,8 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
     for (const auto& [known, number] : corners[v])
       if ((known - normal).squaredNorm() < 1e-8) return number;
     const auto number = static_cast<std::uint32_t>(out.positions.size() / 3);
-    append(out.positions, s.vertices[v]);
-    append(out.normals, normal);
+    append_floats(out.positions, s.vertices[v]);
+    append_floats(out.normals, normal);
     corners[v].emplace_back(normal, number);
     return number;
   };
@@ -180,8 +180,8 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
       if (others > 0 && (straightest >= line_cosine || v > w))
         continue;                                 // only one of the two triangles draws their common edge
       if (made_coarser && others != 1) continue;  // open edges at merged cells are not edges of the body
-      append(out.lines, s.vertices[v]);
-      append(out.lines, s.vertices[w]);
+      append_floats(out.lines, s.vertices[v]);
+      append_floats(out.lines, s.vertices[w]);
     }
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr auto kHandTimeout = std::chrono::seconds(2);
 
-std::array<double, 3> numbers(const Vector3d& v) {
+std::array<double, 3> coordinates_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -50,8 +50,8 @@ void PageHand::run(const std::stop_token& stop) {
 void PageHand::send(const Goal& goal) {
   try {
     if (!client_) client_.emplace(socket_, kHandTimeout);
-    client_->move_hand(numbers(goal.X_BG.translation_m), numbers(rotation_vector(goal.X_BG.rotation)),
-                       kExpires);
+    client_->move_hand(coordinates_of(goal.X_BG.translation_m),
+                       coordinates_of(rotation_vector(goal.X_BG.rotation)), kExpires);
   } catch (const ClientError& error) {
     if (error.code() > 0) client_.reset();  // an error of the connection, not a response of the daemon
     on_rejection_(goal.page, error.what());
