@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,6 +15,7 @@
 
 #include "tests/support/control_rig.hpp"
 #include "tests/support/rate_check.hpp"
+#include "tests/support/soon.hpp"
 
 namespace wrenchd::test_control_socket {
 
@@ -690,8 +692,10 @@ TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
 
 TEST_CASE("replies with descriptors that nobody reads are bounded, and the excess is an error",
           "[control_socket]") {
+  std::atomic<int> calls = 0;
   const MethodRow open{
       "test.open", Role::observer, {}, "Opens a file.", [&](const Json&, const Caller&) {
+        ++calls;
         return MethodResult(Json{{"open", true}}, OwnedFd(::open("/dev/null", O_RDONLY | O_CLOEXEC)));
       }};
   ControlRig rig(resting_config(), {open});
@@ -707,15 +711,18 @@ TEST_CASE("replies with descriptors that nobody reads are bounded, and the exces
   const auto before = open_fds();
   for (int round = 0; round < 40; ++round)
     for (RigClient& one : hoarders) one.send(request("test.open", "{}", "1"));
-  std::this_thread::sleep_for(500ms);
-  CHECK(open_fds() - before <= static_cast<long>(kMaxUserDescriptors));
+  REQUIRE(soon([&] { return calls == 800; }, 60s));
+  CHECK(soon([&] { return open_fds() - before <= static_cast<long>(kMaxUserDescriptors); }));
   // Another user receives one, and a reader of the first user too as soon as it has read.
   RigClient other = rig.connect(TestUser::operator_);
   CHECK(other.error_code("test.open") == 0);
   long with = 0, without = 0;
   for (RigClient& one : hoarders)
-    while (const auto line = one.read_line(50ms))
+    for (int reply = 0; reply < 40; ++reply) {
+      const auto line = one.read_line(10s);
+      REQUIRE(line);
       (Json::parse(*line).contains("error") ? without : with) += 1;
+    }
   CHECK(with <= static_cast<long>(kMaxUserDescriptors));
   CHECK(with + without == 800);
   CHECK(hoarders.front().error_code("test.open") == 0);
