@@ -163,7 +163,7 @@ bool is_in_one_piece(const MeshSurface& surface) {
 
 }  // namespace
 
-/// METHOD, section 14.10: the normal at the nearest point tells on which side p is.
+/// core/METHOD.md, section 14.10: the normal at the nearest point tells on which side p is.
 unsigned side_of_point(const MeshBvh& mesh, const Vector3d& p) noexcept {
   NearestTriangle nearest(mesh, p);
   if (!nearest.search()) return MeshSurface::kBothSides;

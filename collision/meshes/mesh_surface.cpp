@@ -330,7 +330,8 @@ void MeshSurface::find_convex_vertices() {
     const Vector3d& first_guess = kind_ == Kind::solid ? mean_normal : back;
     const std::optional<Vector3d> above = direction_above(directions, first_guess.normalized());
     if (!above) continue;
-    // The vertex is the point of its faces that is nearest to all points above it: METHOD, section 14.10.
+    // The vertex is the point of its faces that is nearest to all points above it: core/METHOD.md,
+    // section 14.10.
     if (is_closed_)
       vertex_sides_[v] = static_cast<std::uint8_t>(above->dot(weighted_normal) > 0.0 ? kFront : kBack);
     const std::uint32_t owner = at[begin[v]];
