@@ -29,8 +29,8 @@ bool projects_inside(const Vector3d& p, const Vector3d& a, const Vector3d& b, co
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene, bool tool_passes_nothing)
-    : scene_(scene), candidates_(scene, tool_passes_nothing) {
+MeshContacts::MeshContacts(const Scene& scene, bool motion_is_continuous)
+    : scene_(scene), candidates_(scene, motion_is_continuous) {
   remaining_pairs_.resize(BvhTraversal::kCapacity);
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -41,14 +41,14 @@ MeshContacts::MeshContacts(const Scene& scene, bool tool_passes_nothing)
 }
 
 void MeshContacts::set_start(const Pose& X_WT, double time_s) noexcept {
-  go_on_from(X_WT, time_s);
+  continue_from(X_WT, time_s);
   X_start_ = X_WT;
   start_time_s_ = time_s;
 }
 
 /// Tells the candidate lists if this pose is neither the start nor the end of a path on which the tool met
 /// nothing.
-void MeshContacts::go_on_from(const Pose& X_WT, double time_s) noexcept {
+void MeshContacts::continue_from(const Pose& X_WT, double time_s) noexcept {
   const bool at_start = same_bits(X_WT, X_start_) && time_s == start_time_s_;
   const bool at_end = same_bits(X_WT, X_free_end_) && time_s == free_end_time_s_;
   if (!at_start && !at_end) candidates_.tool_was_placed();
@@ -56,7 +56,7 @@ void MeshContacts::go_on_from(const Pose& X_WT, double time_s) noexcept {
 
 void MeshContacts::prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s,
                             std::uint32_t spare_visits) noexcept {
-  go_on_from(X_WT, time_s);
+  continue_from(X_WT, time_s);
   candidates_.prefetch(X_WT, X_WP, budget, time_s, spare_visits);
   overlap_found_ = false;
   sweep_visits_ = 0;

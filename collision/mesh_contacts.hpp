@@ -27,9 +27,9 @@ namespace wrenchd {
 /// are RT-safe.
 class MeshContacts final : public SweepQuery {
  public:
-  /// Keeps a reference to the scene, which must outlive this object. tool_passes_nothing: as in
+  /// Keeps a reference to the scene, which must outlive this object. motion_is_continuous: as in
   /// PredictiveCandidateList. Not RT-safe: allocates.
-  explicit MeshContacts(const Scene& scene, bool tool_passes_nothing = true);
+  explicit MeshContacts(const Scene& scene, bool motion_is_continuous = true);
 
   /// Sets the start of the next sweeps: a pose that is admissible at scene time time_s [s]. RT-safe.
   void set_start(const Pose& X_WT, double time_s = 0.0) noexcept override;
@@ -91,7 +91,7 @@ class MeshContacts final : public SweepQuery {
     double sign;  ///< +1 or -1: orients the cross product of da and db out of the obstacle
   };
 
-  void go_on_from(const Pose& X_WT, double time_s) noexcept;
+  void continue_from(const Pose& X_WT, double time_s) noexcept;
   void update_obstacle_views(const Pose& X_WT, double time_s) noexcept;
   void test_pairs(VisitBudget& budget, SweepResult& result) noexcept;
   bool plane_separates(const Heights& start_m, const Heights& end_m, double min_gap_m) const noexcept;

@@ -178,9 +178,9 @@ unsigned side_of_point(const MeshBvh& mesh, const Vector3d& p) noexcept {
   return height < 0.0 ? MeshSurface::kBack : MeshSurface::kBothSides;
 }
 
-SurfaceSides::SurfaceSides(const Scene& scene, bool tool_passes_nothing)
+SurfaceSides::SurfaceSides(const Scene& scene, bool motion_is_continuous)
     : scene_(scene),
-      can_know_(tool_passes_nothing &&
+      can_know_(motion_is_continuous &&
                 std::any_of(scene.meshes().begin(), scene.meshes().end(),
                             [](const MeshObstacle& obstacle) { return obstacle.mesh->divides_space; }) &&
                 is_in_one_piece(scene.tool_mesh()->surface)),

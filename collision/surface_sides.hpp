@@ -27,10 +27,10 @@ unsigned side_of_point(const MeshBvh& mesh, const Vector3d& p) noexcept;
 /// RT-safe.
 class SurfaceSides {
  public:
-  /// Keeps a reference to the scene, which must outlive this object. tool_passes_nothing: false if the tool
+  /// Keeps a reference to the scene, which must outlive this object. motion_is_continuous: false if the tool
   /// may be at any admissible pose next; then the tool can meet all surfaces from both sides. Not RT-safe:
   /// allocates.
-  SurfaceSides(const Scene& scene, bool tool_passes_nothing);
+  SurfaceSides(const Scene& scene, bool motion_is_continuous);
 
   /// Sets a pose that is admissible at scene time time_s [s].
   void set_admissible(const Pose& X_WT, double time_s) noexcept {

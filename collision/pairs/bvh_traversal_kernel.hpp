@@ -329,7 +329,7 @@ WRENCHD_INLINE unsigned on_sides(unsigned bits, unsigned sides, unsigned back, u
 WRENCHD_INLINE unsigned features_of_box(const TriangleBvh::Box& box, unsigned sides) noexcept {
   return on_sides(box.features, sides, TriangleBvh::kBackOfBox, TriangleBvh::kVertices | TriangleBvh::kEdges);
 }
-WRENCHD_INLINE unsigned of_eight(unsigned bits, unsigned sides) noexcept {
+WRENCHD_INLINE unsigned features_of_eight(unsigned bits, unsigned sides) noexcept {
   return on_sides(bits, sides, TriangleBvh::kBackOfEight, 255U);
 }
 
@@ -376,9 +376,9 @@ class Traversal {
       swept_b_ = b;
     }
     const TriangleBvh::Node& eight = job_.a.nodes[node];
-    const unsigned useful =
-        relevant(features_of_box(job_.b.boxes[b], m.sides_b), of_eight(eight.has_vertices, kSidesOfA),
-                 of_eight(eight.has_edges, kSidesOfA));
+    const unsigned useful = relevant(features_of_box(job_.b.boxes[b], m.sides_b),
+                                     features_of_eight(eight.has_vertices, kSidesOfA),
+                                     features_of_eight(eight.has_edges, kSidesOfA));
     for (unsigned hits = overlapping(box_b_, eight) & useful; hits != 0; hits &= hits - 1)
       push(kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)), b);
   }
@@ -390,9 +390,9 @@ class Traversal {
       swept_a_ = a;
     }
     const TriangleBvh::Node& eight = job_.b.nodes[node];
-    const unsigned useful =
-        relevant(features_of_box(job_.a.boxes[a], kSidesOfA), of_eight(eight.has_vertices, m.sides_b),
-                 of_eight(eight.has_edges, m.sides_b));
+    const unsigned useful = relevant(features_of_box(job_.a.boxes[a], kSidesOfA),
+                                     features_of_eight(eight.has_vertices, m.sides_b),
+                                     features_of_eight(eight.has_edges, m.sides_b));
     for (unsigned hits = overlapping(box_a_, eight) & useful; hits != 0; hits &= hits - 1)
       push(a, kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)));
   }
@@ -437,8 +437,8 @@ class Traversal {
                       apart);
       return;
     }
-    const unsigned b_vertices = of_eight(b.has_vertices, m.sides_b),
-                   b_edges = of_eight(b.has_edges, m.sides_b);
+    const unsigned b_vertices = features_of_eight(b.has_vertices, m.sides_b),
+                   b_edges = features_of_eight(b.has_edges, m.sides_b);
     const float distance = (distance_bound(box_b, m.centre_B) + m.centre_travel) / m.radius;
     const float margin_of_plane = m.rounding + m.reach * (distance > 1.0F ? distance : 1.0F);
     for (rows &= ~lane_mask(clear_of_box(a, at_rest(box_b), margin_of_plane, m.moving)); rows != 0;
@@ -446,8 +446,8 @@ class Traversal {
       const int i = __builtin_ctz(rows);
       const TriangleBvh::Leaf& leaf_a = job_.a.leaves[box_a.child];
       const std::uint32_t ta = leaf_a.triangle[i];
-      const unsigned features = ((of_eight(leaf_a.has_vertices, kSidesOfA) >> i) & 1U) |
-                                (((of_eight(leaf_a.has_edges, kSidesOfA) >> i) & 1U) << 1);
+      const unsigned features = ((features_of_eight(leaf_a.has_vertices, kSidesOfA) >> i) & 1U) |
+                                (((features_of_eight(leaf_a.has_edges, kSidesOfA) >> i) & 1U) << 1);
       const unsigned useful = relevant(features, b_vertices, b_edges);
       if (useful == 0) continue;
       for (unsigned hits = near_triangles(a, i, b, apart, m.margin, margin_of_plane, m.moving) & useful;

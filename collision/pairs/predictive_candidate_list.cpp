@@ -84,9 +84,9 @@ bool continue_list(CandidatePairs& list, std::uint32_t visits, VisitBudget& budg
 
 }  // namespace
 
-PredictiveCandidateList::PredictiveCandidateList(const Scene& scene, bool tool_passes_nothing)
+PredictiveCandidateList::PredictiveCandidateList(const Scene& scene, bool motion_is_continuous)
     : scene_(scene),
-      sides_(scene, tool_passes_nothing),
+      sides_(scene, motion_is_continuous),
       lists_{CandidatePairs(scene, &sides_), CandidatePairs(scene, &sides_), CandidatePairs(scene, &sides_)},
       horizon_ticks_(kMaxHorizon_ticks) {}
 

@@ -22,11 +22,11 @@ class PredictiveCandidateList {
   /// Number of pairs that the culler tests in the time of one node visit.
   static constexpr std::size_t kPairsPerVisit = 32;
 
-  /// Keeps a reference to the scene, which must outlive this object. tool_passes_nothing: the starts of all
+  /// Keeps a reference to the scene, which must outlive this object. motion_is_continuous: the starts of all
   /// paths are admissible, and the tool goes from one to the next without passing through a surface, unless
   /// reset() or tool_was_placed() is called in between. False: a path may start anywhere. Not RT-safe:
   /// allocates.
-  explicit PredictiveCandidateList(const Scene& scene, bool tool_passes_nothing = false);
+  explicit PredictiveCandidateList(const Scene& scene, bool motion_is_continuous = false);
   PredictiveCandidateList(const PredictiveCandidateList&) = delete;  // a copy would lose the reserved memory
   PredictiveCandidateList& operator=(const PredictiveCandidateList&) = delete;
 
