@@ -113,8 +113,8 @@ TEST_CASE("the tool is on the side where it was placed, at the obstacle's pose o
 TEST_CASE("a tool is on both sides if it may be anywhere next, or if tool or surface does not stay on one",
           "[surface_sides]") {
   const TriangleMesh cube = make_mesh({"cube", 12}), small = scaled(cube, 0.05);
-  const auto sides_of = [](const Scene& scene, bool tool_passes_nothing) {
-    SurfaceSides sides(scene, tool_passes_nothing);
+  const auto sides_of = [](const Scene& scene, bool motion_is_continuous) {
+    SurfaceSides sides(scene, motion_is_continuous);
     sides.set_admissible(Pose{}, 0.0);
     const unsigned out = sides.of(0);
     CHECK(sides.any_known() == (out != MeshSurface::kBothSides));
